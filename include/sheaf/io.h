@@ -1,0 +1,47 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "sheaf/error.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+struct ReadOptions {
+  bool hash = false;  ///< also compute the SHA-256 of the file's bytes, on another thread
+};
+
+/// What was read, and from what.
+struct InputFile {
+  Problem problem;
+  std::string format;       ///< "bal"
+  std::string compression;  ///< "none", "gzip" or "bzip2"
+  std::string sha256;       ///< 64 hexadecimal digits, or empty when not asked for
+  std::uint64_t bytes = 0;  ///< size on disk
+  double read_s = 0;        ///< seconds spent reading and parsing
+};
+
+/// Reads a problem; format and compression are sniffed from the content, never from the name.
+/// Errors: ErrorCode::unreadable_input with file, line (or byte), what was found, what was expected.
+Result<InputFile> read_file(const std::filesystem::path& path, const ReadOptions& options = {});
+Result<Problem> read(const std::filesystem::path& path);
+
+/// Writes a problem, beside the target and then renamed over it. The format follows the name:
+/// `.ply` is a point cloud with camera frusta, anything else is BAL; a trailing `.gz` or `.bz2`
+/// compresses. BAL text states every double exactly (shortest form that reads back to the same
+/// bits). Errors: ErrorCode::unwritable_output; the target is then as it was before.
+Result<void> write(const Problem& problem, const std::filesystem::path& path);
+
+/// Whether `write` to this path can begin: the folder exists and a file can be created beside the
+/// target. Leaves nothing behind.
+Result<void> check_writable(const std::filesystem::path& path);
+
+/// Two states of one scene in one binary coloured PLY: the start in grey, the result in colour,
+/// each with its camera frusta as points and edges.
+Result<void> write_ply(const Problem& before, const Problem& after,
+                       const std::filesystem::path& path);
+
+}  // namespace sheaf

@@ -1,0 +1,11 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "sheaf/error.h"
+#include "sheaf/io.h"
+#include "sheaf/options.h"
+#include "sheaf/problem.h"
+#include "sheaf/scene.h"
+#include "sheaf/solve.h"
+#include "sheaf/summary.h"
