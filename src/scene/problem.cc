@@ -1,0 +1,149 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sheaf/problem.h"
+
+#include <cmath>
+#include <string>
+
+#include "geometry/bal_camera.h"
+#include "geometry/rotation.h"
+
+namespace sheaf {
+
+std::uint32_t Problem::add_image(const Pose& pose, const Camera& camera) {
+  cameras.push_back(camera);
+  return add_image(pose, static_cast<std::uint32_t>(cameras.size() - 1));
+}
+
+std::uint32_t Problem::add_image(const Pose& pose, std::uint32_t camera) {
+  poses.push_back(pose);
+  image_camera.push_back(camera);
+  return static_cast<std::uint32_t>(poses.size() - 1);
+}
+
+std::uint32_t Problem::add_point(double x, double y, double z) {
+  points.insert(points.end(), {x, y, z});
+  return static_cast<std::uint32_t>(num_points() - 1);
+}
+
+void Problem::add_observation(std::uint32_t image, std::uint32_t point, double x_px, double y_px) {
+  observation_image.push_back(image);
+  observation_point.push_back(point);
+  observation_xy.insert(observation_xy.end(), {x_px, y_px});
+}
+
+namespace {
+
+Error invalid(const std::string& message) { return Error(ErrorCode::usage, message); }
+
+std::string numbered(const char* what, std::size_t i) {
+  return std::string(what) + " " + std::to_string(i);
+}
+
+Result<void> validate_sizes(const Problem& p) {
+  if (p.image_camera.size() != p.poses.size())
+    return invalid("image_camera has " + std::to_string(p.image_camera.size()) + " entries for " +
+                   std::to_string(p.poses.size()) + " poses");
+  if (p.points.size() % 3 != 0) return invalid("points does not hold three numbers for each point");
+  if (p.observation_point.size() != p.num_observations() ||
+      p.observation_xy.size() != 2 * p.num_observations())
+    return invalid("observation arrays disagree in length: " +
+                   std::to_string(p.observation_image.size()) + " images, " +
+                   std::to_string(p.observation_point.size()) + " points, " +
+                   std::to_string(p.observation_xy.size()) + " coordinates");
+  if (!p.bal_angle_axis.empty() && p.bal_angle_axis.size() != 3 * p.num_images())
+    return invalid("bal_angle_axis must be empty or hold three numbers for each image");
+  if (p.num_images() >= UINT32_MAX || p.num_points() >= UINT32_MAX)
+    return invalid("more than 2^32 - 2 images or points");
+  return {};
+}
+
+Result<void> validate_images(const Problem& p) {
+  for (std::size_t i = 0; i < p.num_images(); ++i) {
+    if (p.image_camera[i] >= p.cameras.size())
+      return invalid(numbered("image", i) + " names camera " + std::to_string(p.image_camera[i]) +
+                     " of " + std::to_string(p.cameras.size()));
+    double norm2 = 0;
+    for (double q : p.poses[i].rotation) norm2 += q * q;
+    if (!(std::abs(norm2 - 1) < 1e-6))
+      return invalid(numbered("pose", i) + ": the rotation is not a unit quaternion");
+    for (double t : p.poses[i].translation)
+      if (!std::isfinite(t)) return invalid(numbered("pose", i) + ": the translation is not finite");
+  }
+  for (std::size_t i = 0; i < p.cameras.size(); ++i)
+    for (double k : p.cameras[i].parameters)
+      if (!std::isfinite(k)) return invalid(numbered("camera", i) + ": a parameter is not finite");
+  return {};
+}
+
+Result<void> validate_observations(const Problem& p) {
+  for (std::size_t i = 0; i < p.points.size(); ++i)
+    if (!std::isfinite(p.points[i]))
+      return invalid(numbered("point", i / 3) + ": a coordinate is not finite");
+  for (std::size_t i = 0; i < p.num_observations(); ++i) {
+    if (p.observation_image[i] >= p.num_images())
+      return invalid(numbered("observation", i) + " names image " +
+                     std::to_string(p.observation_image[i]) + " of " +
+                     std::to_string(p.num_images()));
+    if (p.observation_point[i] >= p.num_points())
+      return invalid(numbered("observation", i) + " names point " +
+                     std::to_string(p.observation_point[i]) + " of " +
+                     std::to_string(p.num_points()));
+    if (!std::isfinite(p.observation_xy[2 * i]) || !std::isfinite(p.observation_xy[2 * i + 1]))
+      return invalid(numbered("observation", i) + ": the pixel is not finite");
+  }
+  return {};
+}
+
+/// Neumaier's compensated sum.
+struct CompensatedSum {
+  double sum = 0, correction = 0;
+  void add(double x) {
+    const double t = sum + x;
+    correction += std::abs(sum) >= std::abs(x) ? (sum - t) + x : (x - t) + sum;
+    sum = t;
+  }
+  double value() const { return sum + correction; }
+};
+
+}  // namespace
+
+Result<void> validate(const Problem& problem) {
+  for (const auto& check : {validate_sizes, validate_images, validate_observations})
+    if (Result<void> result = check(problem); !result.ok()) return result;
+  return {};
+}
+
+Evaluation evaluate(const Problem& problem) {
+  std::vector<Matrix3<double>> rotations;
+  rotations.reserve(problem.num_images());
+  for (const Pose& pose : problem.poses) rotations.push_back(matrix_from_quaternion(pose.rotation));
+
+  Evaluation out;
+  CompensatedSum sum;
+  std::size_t finite = 0;
+  for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    const std::uint32_t image = problem.observation_image[i];
+    const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
+    const auto& t = problem.poses[image].translation;
+    const auto& k = problem.cameras[problem.image_camera[image]].parameters;
+    Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
+    for (int j = 0; j < 3; ++j) P[j] += t[j];
+    const auto u = project(BalCamera<double>{k[0], k[1], k[2]}, P);
+    const double dx = u[0] - problem.observation_xy[2 * i];
+    const double dy = u[1] - problem.observation_xy[2 * i + 1];
+    const double square = dx * dx + dy * dy;
+    if (P[2] > 0) out.behind.push_back(i);
+    if (!std::isfinite(square)) {
+      out.not_finite.push_back(i);
+      continue;
+    }
+    sum.add(square);
+    ++finite;
+  }
+  out.cost = sum.value() / 2;
+  out.rms_px = finite > 0 ? std::sqrt(sum.value() / static_cast<double>(finite)) : 0;
+  return out;
+}
+
+}  // namespace sheaf
