@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Copyright (c) 2026, the Sheaf authors.
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Builds the tests with sanitizers and runs them.
+#   scripts/run-sanitizers.sh asan    addresses and undefined behaviour, all tests
+#   scripts/run-sanitizers.sh tsan    data races, the tests that name threads or determinism
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+kind=$1
+
+run_ctest() { ctest --test-dir "build/$kind" -j "$(nproc)" --output-on-failure --progress "$@"; }
+case $kind in
+  asan)
+    scripts/build.sh asan
+    ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 run_ctest
+    ;;
+  tsan)
+    # The distribution's TBB is not instrumented. What it orders is told to the sanitizer in
+    # src/platform/parallel.h; what it does inside is left out here.
+    export TSAN_OPTIONS="suppressions=$PWD/scripts/tsan-suppressions.txt halt_on_error=1"
+    # Wide address randomisation stops this sanitizer on some kernels: switch it off for the run.
+    run=()
+    setarch "$(uname -m)" -R true 2>/dev/null && run=(setarch "$(uname -m)" -R)
+    echo 'int main() {}' | c++ -fsanitize=thread -x c++ - -o build/tsan-probe
+    if ! "${run[@]}" build/tsan-probe 2>/dev/null; then
+      echo "tsan: this kernel does not let the thread sanitizer run: NOT CHECKED"
+      exit 0
+    fi
+    export CTEST_OUTPUT_ON_FAILURE=1
+    "${run[@]}" scripts/build.sh tsan
+    "${run[@]}" ctest --test-dir build/tsan -j "$(nproc)" --output-on-failure --progress \
+      -R '[Tt]hread|[Dd]etermin|[Pp]arallel' --no-tests=error
+    ;;
+  *)
+    echo "usage: scripts/run-sanitizers.sh asan|tsan" >&2
+    exit 2
+    ;;
+esac
