@@ -1,0 +1,81 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <bit>
+#include <charconv>
+#include <vector>
+
+#include "geometry/rotation.h"
+#include "io/bal.h"
+
+namespace sheaf {
+namespace {
+
+/// Formats into a large buffer, so that the file sees few writes.
+class TextBuffer {
+ public:
+  explicit TextBuffer(OutputFile& out) : out_(out), buffer_(kBytes) {}
+
+  template <class Number>
+  void put(Number value, char separator) {
+    char* const end = buffer_.data() + buffer_.size();
+    if (end - p_ < kLongestNumber) flush();
+    p_ = std::to_chars(p_, end, value).ptr;
+    *p_++ = separator;
+  }
+
+  void flush() {
+    out_.write(buffer_.data(), static_cast<std::size_t>(p_ - buffer_.data()));
+    p_ = buffer_.data();
+  }
+
+ private:
+  static constexpr std::size_t kBytes = 1 << 18;
+  static constexpr std::ptrdiff_t kLongestNumber = 32;  // -2.2250738585072014e-308 and a separator
+
+  OutputFile& out_;
+  std::vector<char> buffer_;
+  char* p_ = buffer_.data();
+};
+
+bool same_bits(const Quaternion<double>& a, const Quaternion<double>& b) {
+  for (std::size_t k = 0; k < 4; ++k)
+    if (std::bit_cast<std::uint64_t>(a[k]) != std::bit_cast<std::uint64_t>(b[k])) return false;
+  return true;
+}
+
+Vector3<double> rotation_of(const Problem& problem, std::size_t image) {
+  const Quaternion<double>& q = problem.poses[image].rotation;
+  if (!problem.bal_angle_axis.empty()) {
+    const double* a = &problem.bal_angle_axis[3 * image];
+    const Vector3<double> stated{a[0], a[1], a[2]};
+    if (same_bits(quaternion_from_angle_axis(stated), q)) return stated;
+  }
+  return angle_axis_from_quaternion(q);
+}
+
+}  // namespace
+
+Result<void> write_bal(const Problem& problem, OutputFile& out) {
+  TextBuffer text(out);
+  text.put(problem.num_images(), ' ');
+  text.put(problem.num_points(), ' ');
+  text.put(problem.num_observations(), '\n');
+  for (std::size_t i = 0; i < problem.num_observations() && !out.failed(); ++i) {
+    text.put(problem.observation_image[i], ' ');
+    text.put(problem.observation_point[i], ' ');
+    text.put(problem.observation_xy[2 * i], ' ');
+    text.put(problem.observation_xy[2 * i + 1], '\n');
+  }
+  for (std::size_t i = 0; i < problem.num_images() && !out.failed(); ++i) {
+    for (double v : rotation_of(problem, i)) text.put(v, '\n');
+    for (double v : problem.poses[i].translation) text.put(v, '\n');
+    for (double v : problem.cameras[problem.image_camera[i]].parameters) text.put(v, '\n');
+  }
+  for (std::size_t i = 0; i < problem.points.size() && !out.failed(); ++i)
+    text.put(problem.points[i], '\n');
+  text.flush();
+  return out.commit();
+}
+
+}  // namespace sheaf
