@@ -16,4 +16,4 @@ fi
 scripts/install-deps.sh
 scripts/build.sh "$preset"
 echo "test: real data is looked for in ${SHEAF_DATA:-data}"
-exec ctest --test-dir "build/$preset" -j "$(nproc)" --output-on-failure --progress "$@"
+exec ctest --test-dir "build/$preset" -j "$(nproc)" --output-on-failure "$@"
