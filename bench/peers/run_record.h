@@ -1,0 +1,62 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What every peer program takes and says: its arguments, its clock, its JSON.
+#pragma once
+
+#include <limits>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace peer {
+
+struct Arguments {
+  std::string input, output, config;
+  int threads = 1;
+  int max_iterations = 50;
+  double time_limit_s = std::numeric_limits<double>::infinity();
+  double cost_target = -1;  ///< stop once the cost is at or below it
+  bool test = false;        ///< check the derivatives instead of solving
+};
+
+/// IN --config NAME --threads N --max-iterations K --time-limit S --out FILE --cost-target C
+/// False with the usage on stderr.
+bool parse_arguments(int argc, char** argv, Arguments& arguments);
+
+/// A configuration is words joined by '-', some with a value: "dense_schur-analytic-eta=0.1".
+class Config {
+ public:
+  explicit Config(const std::string& text);
+  bool has(const std::string& word);  ///< and marks it as known
+  double value(const std::string& word, double otherwise);
+  std::string unknown() const;  ///< a word that nobody asked for, or ""
+
+ private:
+  std::vector<std::string> words_;
+  std::set<std::string> known_;
+};
+
+/// The run's clock (0 = start of building the problem) and trace. The time spent in recording
+/// itself is taken off, so that a peer does not pay for being watched.
+class RunRecord {
+ public:
+  void start();
+  void setup_done() { setup_s_ = now(); }
+  double now() const;
+  void pause();
+  void resume();
+  void add(double cost);  ///< cost of the state held now
+  void finish();          ///< the solver returned
+
+  bool over(const Arguments& arguments) const;  ///< target reached or time spent
+  std::string json(const std::string& solver, const Arguments& arguments) const;
+
+ private:
+  std::vector<std::pair<double, double>> trace_;  // time_s, cost
+  double start_s_ = 0, paused_s_ = 0, pause_begin_s_ = 0, setup_s_ = 0, total_s_ = 0;
+  double cpu_start_s_ = 0, cpu_s_ = 0;
+};
+
+}  // namespace peer
