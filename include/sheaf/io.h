@@ -25,7 +25,8 @@ struct InputFile {
 };
 
 /// Reads a problem; format and compression are sniffed from the content, never from the name.
-/// Errors: ErrorCode::unreadable_input with file, line (or byte), what was found, what was expected.
+/// Errors: ErrorCode::unreadable_input with file, line (or byte), what was found, what was
+/// expected.
 Result<InputFile> read_file(const std::filesystem::path& path, const ReadOptions& options = {});
 Result<Problem> read(const std::filesystem::path& path);
 

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <limits>
 #include <stop_token>
-#include <vector>
+
+#include "sheaf/problem.h"
 
 namespace sheaf {
 
@@ -25,32 +25,21 @@ enum class Simd { best, scalar, sse4, avx2, avx512 };
 /// How the reduced camera system is solved.
 enum class CameraSolverKind { automatic, dense };
 
-/// What the solver may not change. What is held does not move by a bit.
-struct Fixed {
-  bool points = false;
-  bool poses = false;
-  bool f = false;   ///< focal lengths of all cameras
-  bool k1 = false;  ///< first radial coefficient of all cameras
-  bool k2 = false;  ///< second radial coefficient of all cameras
-  std::vector<std::uint32_t> pose_ids;    ///< single poses, by image index
-  std::vector<std::uint32_t> camera_ids;  ///< single lenses, all their parameters, by camera index
-};
-
 struct SolveOptions {
-  int max_iterations = 50;      ///< trust region steps tried, rejected ones included
-  double tolerance = 1e-8;      ///< stop when the relative cost decrease stays below this twice
+  int max_iterations = 50;  ///< trust region steps tried, rejected ones included
+  double tolerance = 1e-8;  ///< stop when the relative cost decrease stays below this twice
   double gradient_tolerance = 1e-10;  ///< stop when the scaled gradient is below this x its start
   double time_limit_s = std::numeric_limits<double>::infinity();  ///< set-up included
-  int threads = 0;              ///< 0: all; the result does not depend on it
+  int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
   Fixed fixed;
   CameraSolverKind solver = CameraSolverKind::automatic;
-  double initial_damping = 0;   ///< 0: the default rule
-  Simd simd = Simd::best;       ///< for tests and measurements
+  double initial_damping = 0;  ///< 0: the default rule
+  Simd simd = Simd::best;      ///< for tests and measurements
 
   /// Called after the start was evaluated (index 0) and after every step; return false to stop.
   std::function<bool(const Iteration&)> on_iteration;
-  std::stop_token stop;         ///< asks the solver to end within one evaluation
+  std::stop_token stop;  ///< asks the solver to end within one evaluation
 };
 
 }  // namespace sheaf

@@ -33,13 +33,13 @@ struct Camera {
 /// order. Image j has the pose `poses[j]` and the lens `cameras[image_camera[j]]`; several images
 /// may share one lens.
 struct Problem {
-  std::vector<Pose> poses;                   ///< one for each image
-  std::vector<std::uint32_t> image_camera;   ///< one for each image: index into cameras
-  std::vector<Camera> cameras;               ///< lenses
-  std::vector<double> points;                ///< 3 x points: X, Y, Z, scene units
+  std::vector<Pose> poses;                  ///< one for each image
+  std::vector<std::uint32_t> image_camera;  ///< one for each image: index into cameras
+  std::vector<Camera> cameras;              ///< lenses
+  std::vector<double> points;               ///< 3 x points: X, Y, Z, scene units
   std::vector<std::uint32_t> observation_image;
   std::vector<std::uint32_t> observation_point;
-  std::vector<double> observation_xy;        ///< 2 x observations, pixels
+  std::vector<double> observation_xy;  ///< 2 x observations, pixels
 
   /// Rotations as a BAL file stated them (3 per image, angle-axis, radians), or empty. They are
   /// what a writer puts out for each pose whose quaternion is still the one they convert to, so
@@ -57,6 +57,17 @@ struct Problem {
   void add_observation(std::uint32_t image, std::uint32_t point, double x_px, double y_px);
 };
 
+/// What the solver may not change. What is held does not move by a bit.
+struct Fixed {
+  bool points = false;
+  bool poses = false;
+  bool f = false;                         ///< focal lengths of all cameras
+  bool k1 = false;                        ///< first radial coefficient of all cameras
+  bool k2 = false;                        ///< second radial coefficient of all cameras
+  std::vector<std::uint32_t> pose_ids;    ///< single poses, by image index
+  std::vector<std::uint32_t> camera_ids;  ///< single lenses, all their parameters, by camera index
+};
+
 /// Checks sizes, index ranges, finite numbers and unit quaternions (to 1e-6). The message names
 /// the first offending entry.
 Result<void> validate(const Problem& problem);
@@ -64,10 +75,11 @@ Result<void> validate(const Problem& problem);
 /// Cost 1/2 sum |r|^2 of the plain (not robust) problem by straightforward scalar code, with
 /// compensated summation. Independent of the solver's own evaluation.
 struct Evaluation {
-  double cost = 0;                       ///< 1/2 sum |r|^2, px^2
-  double rms_px = 0;                     ///< sqrt(sum |r|^2 / observations): per observation
-  std::vector<std::uint64_t> behind;     ///< observations whose point lies behind the camera
-  std::vector<std::uint64_t> not_finite; ///< observations whose residual is not finite; not in cost
+  double cost = 0;                    ///< 1/2 sum |r|^2, px^2
+  double rms_px = 0;                  ///< sqrt(sum |r|^2 / observations): per observation
+  std::vector<std::uint64_t> behind;  ///< observations whose point lies behind the camera
+  std::vector<std::uint64_t>
+      not_finite;  ///< observations whose residual is not finite; not in cost
 };
 Evaluation evaluate(const Problem& problem);
 

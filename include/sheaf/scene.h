@@ -13,12 +13,12 @@ namespace sheaf {
 struct SceneOptions {
   std::uint64_t images = 16;
   std::uint64_t points = 4000;
-  double mean_track = 4;            ///< observations per point, on average (at least 2)
-  double pixel_noise_px = 0.5;      ///< standard deviation of the measurements
+  double mean_track = 4;              ///< observations per point, on average (at least 2)
+  double pixel_noise_px = 0.5;        ///< standard deviation of the measurements
   double rotation_noise_rad = 0.005;  ///< of the start
-  double center_noise = 0.02;       ///< of the start, scene units (the cameras stand about 1 apart)
-  double point_noise = 0.05;        ///< of the start, scene units
-  double focal_noise = 0.01;        ///< of the start, relative
+  double center_noise = 0.02;  ///< of the start, scene units (the cameras stand about 1 apart)
+  double point_noise = 0.05;   ///< of the start, scene units
+  double focal_noise = 0.01;   ///< of the start, relative
   std::uint64_t seed = 1;
 };
 

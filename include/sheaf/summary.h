@@ -11,16 +11,16 @@ namespace sheaf {
 /// One trust region step. Index 0 is the start: no trial, accepted.
 struct Iteration {
   int index = 0;
-  double cost = 0;           ///< of the state held after the step
-  double trial_cost = 0;     ///< of the state tried; may be infinite or NaN
+  double cost = 0;        ///< of the state held after the step
+  double trial_cost = 0;  ///< of the state tried; may be infinite or NaN
   bool accepted = true;
-  double damping = 0;        ///< lambda the step was computed with
-  double gain_ratio = 0;     ///< actual / predicted decrease
-  double gradient_max = 0;   ///< px; largest |J_i^T r| / |J_i| over the free columns, at the state
-                             ///< the step starts from, points eliminated
-  double step_norm = 0;      ///< largest relative change of any one block
+  double damping = 0;       ///< lambda the step was computed with
+  double gain_ratio = 0;    ///< actual / predicted decrease
+  double gradient_max = 0;  ///< px; largest |J_i^T r| / |J_i| over the free columns, at the state
+                            ///< the step starts from, points eliminated
+  double step_norm = 0;     ///< largest relative change of any one block
   int linear_iterations = 0;
-  double time_s = 0;         ///< since set-up ended
+  double time_s = 0;  ///< since set-up ended
 };
 
 enum class Termination {
@@ -29,8 +29,8 @@ enum class Termination {
   step_converged,      ///< no block moves by more than rounding
   max_iterations,
   time_limit,
-  stopped,             ///< by the callback or the stop token
-  no_usable_step,      ///< no step could be computed or accepted from the start
+  stopped,         ///< by the callback or the stop token
+  no_usable_step,  ///< no step could be computed or accepted from the start
 };
 
 /// "cost_converged", ... : stable, for JSON.
@@ -43,18 +43,18 @@ struct Summary {
   double initial_rms_px = 0;  ///< per observation
   double final_rms_px = 0;
   Termination termination = Termination::no_usable_step;
-  std::string words;          ///< the reason for stopping, as a sentence
+  std::string words;  ///< the reason for stopping, as a sentence
   std::vector<Iteration> iterations;
 
   std::string solver;         ///< "dense", ...
   std::string solver_reason;  ///< one line: why this one
   std::string precision = "double";
-  std::string simd;           ///< instruction set used
+  std::string simd;  ///< instruction set used
   int threads = 1;
   std::uint64_t forecast_bytes = 0;  ///< predicted peak resident size of the process
 
-  double setup_s = 0;         ///< sorting, indexing, allocating
-  double solve_s = 0;         ///< after set-up
+  double setup_s = 0;  ///< sorting, indexing, allocating
+  double solve_s = 0;  ///< after set-up
 
   std::vector<std::uint64_t> behind_camera_before;  ///< observation indices
   std::vector<std::uint64_t> behind_camera_after;
