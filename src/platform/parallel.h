@@ -1,0 +1,72 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <thread>
+#include <vector>
+
+// The thread sanitizer does not see the order that a TBB of the distribution establishes, and takes
+// every task for a race with its caller. Builds for it run the tasks on plain threads instead.
+#if defined(__SANITIZE_THREAD__)
+#define SHEAF_PLAIN_THREADS 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define SHEAF_PLAIN_THREADS 1
+#endif
+#endif
+
+namespace sheaf {
+
+/// Runs independent tasks on a fixed number of threads. Results must not depend on which thread
+/// runs which task, nor on the order: every task owns what it writes.
+class Threads {
+ public:
+  /// count 0: as many as the machine offers to this process.
+  explicit Threads(int count)
+      : arena_(count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency()),
+        count_(arena_.max_concurrency()) {}
+
+  int count() const { return count_; }
+
+  /// Number of the calling thread within for_each, in [0, count()).
+  int worker() const { return count_ == 1 ? 0 : std::max(0, oneapi::tbb::this_task_arena::current_thread_index()); }
+
+  /// task(i) for every i in [0, tasks), each exactly once.
+  template <class Task>
+  void for_each(std::size_t tasks, const Task& task) {
+    if (count_ == 1 || tasks < 2) {
+      for (std::size_t i = 0; i < tasks; ++i) task(i);
+      return;
+    }
+#if defined(SHEAF_PLAIN_THREADS)
+    // Dealt out in turn, so that neighbouring tasks always run on different threads and no order
+    // between them can hide that both write to one place.
+    const auto work = [&](std::size_t first) {
+      for (std::size_t i = first; i < tasks; i += count_) task(i);
+    };
+    std::vector<std::jthread> others;
+    for (int i = 1; i < count_; ++i) others.emplace_back(work, i);
+    work(0);
+#else
+    arena_.execute([&] {
+      oneapi::tbb::parallel_for(
+          oneapi::tbb::blocked_range<std::size_t>(0, tasks, 1),
+          [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) task(i);
+          },
+          oneapi::tbb::simple_partitioner());
+    });
+#endif
+  }
+
+ private:
+  oneapi::tbb::task_arena arena_;
+  int count_;
+};
+
+}  // namespace sheaf
