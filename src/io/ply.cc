@@ -72,8 +72,9 @@ double distance(const Vector3<double>& a, const Vector3<double>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-/// The value below which the given part of them lies; 0 of none.
+/// The value below which the given part of the finite ones lies; 0 of none.
 double quantile(std::vector<double> values, double part) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
   if (values.empty()) return 0;
   const auto nth =
       values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));

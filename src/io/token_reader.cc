@@ -124,8 +124,13 @@ std::string TokenReader::found() const {
   if (!printable(*token_)) return "binary data (byte " + hex_byte(*token_) + ")";
   std::string text = "'";
   const char* p = token_;
-  for (; p < end_ && !is_space(*p) && p < token_ + kShown; ++p)
-    printable(*p) ? text += *p : text.append("\\").append(hex_byte(*p), 1);
+  for (; p < end_ && !is_space(*p) && p < token_ + kShown; ++p) {
+    if (printable(*p)) {
+      text += *p;
+    } else {
+      text.append("\\").append(hex_byte(*p), 1);
+    }
+  }
   if (p < end_ && !is_space(*p)) text += "...";
   return text + "'";
 }
