@@ -11,22 +11,29 @@ scripts/install-deps.sh
 scripts/build.sh release --target sheaf_command
 sheaf=build/release/sheaf
 
-echo
-echo "demo: a generated scene (nothing to download)"
-"$sheaf" demo
+mkdir -p out
+run() {
+  echo "+ sheaf $*"
+  "$sheaf" "$@"
+}
 
 echo
-mkdir -p out
+echo "demo: a generated scene, nothing to download"
+run demo --ply out/demo.ply
+
+echo
 if scripts/get-data.sh; then
   scene=${SHEAF_DATA:-data}/bal/dubrovnik-16-22106-pre.txt
-  refined=out/dubrovnik-16-refined.txt
+  name=dubrovnik-16
   echo "demo: the real scene dubrovnik-16"
 else
   scene=out/generated.txt
-  refined=out/generated-refined.txt
-  echo "demo: the real scene could not be had: a generated one in a file instead"
-  "$sheaf" generate "$scene" --cameras 16 --points 22000
+  name=generated
+  echo "demo: without the real scene, a generated one of its size, read from a file"
+  run generate "$scene" --cameras 16 --points 22106
 fi
-echo "+ sheaf solve $scene -o $refined --ply ${refined%.txt}.ply --json ${refined%.txt}.json"
-"$sheaf" solve "$scene" -o "$refined" --ply "${refined%.txt}.ply" --json "${refined%.txt}.json"
-echo "demo: wrote $refined, ${refined%.txt}.ply (open it in a point cloud viewer) and ${refined%.txt}.json"
+run solve "$scene" -o "out/$name-refined.txt" --ply "out/$name.ply" --json "out/$name.json"
+
+echo
+echo "demo: solved $scene; in out/ now: $name-refined.txt, $name.json, and $name.ply and demo.ply"
+echo "demo: for a viewer of point clouds (start in grey, result in colour)"
