@@ -1,0 +1,235 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "linear/bundle_system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "linear/block_solver.h"
+
+namespace sheaf {
+
+BundleSystem::BundleSystem(const Problem& problem, const Fixed& fixed, bool watch_behind,
+                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
+                           Threads& threads)
+    : points_held_(fixed.points),
+      watch_behind_(watch_behind),
+      kernels_(kernels),
+      threads_(threads),
+      batches_(arrange(problem, skip)),
+      chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
+                              !fixed.points, threads)),
+      columns_(number_columns(problem, fixed)) {
+  fill_state(problem);
+  const std::size_t slices = chunks_.slices.size() - 1;
+  factors_.allocate(kFactorGroup * batches_.groups.size());
+  tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
+  diagonal_.allocate(slices * kDiagonalDoubles * problem.num_images());
+  scratch_.resize(threads.count());
+  const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
+  damping_.allocate(padded);
+  camera_step_.allocate(padded);
+  if (couples_images() || problem.cameras.size() < problem.num_images())
+    dense_ = std::make_unique<DenseCameraSolver>(columns_, kernels.name);
+}
+
+void BundleSystem::fill_state(const Problem& problem) {
+  poses_.reserve(problem.num_images());
+  for (const Pose& pose : problem.poses) poses_.push_back({pose.rotation, pose.translation});
+  image_camera_ = problem.image_camera;
+  lenses_.reserve(problem.cameras.size());
+  for (const Camera& camera : problem.cameras) lenses_.push_back(camera.parameters);
+  trial_poses_ = poses_;
+  trial_lenses_ = lenses_;
+  cameras_.allocate(kCameraRecord * problem.num_images());
+  trial_cameras_.allocate(kCameraRecord * problem.num_images());
+  for (std::size_t i = 0; i < poses_.size(); ++i)
+    write_camera_record(i, poses_[i], lenses_[image_camera_[i]].data(), cameras_.data());
+  points_.allocate(kPointGroup * batches_.groups.size());
+  trial_points_.allocate(points_.size());
+  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
+    for (int l = 0; l < 8; ++l) {
+      const double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+      for (int d = 0; d < 3; ++d) points_[kPointGroup * g + 8 * d + l] = X[d];
+    }
+}
+
+void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<double>& pose,
+                                       const double* parameters, double* records) {
+  double* record = records + kCameraRecord * image;
+  const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+  std::copy(R.begin(), R.end(), record);
+  std::copy(pose.translation.begin(), pose.translation.end(), record + 9);
+  std::copy(parameters, parameters + 3, record + camera_record::kFocal);
+  std::fill(record + camera_record::kStep, record + kCameraRecord, 0.0);
+}
+
+Step BundleSystem::propose(double damping) {
+  const std::size_t slices = chunks_.slices.size() - 1;
+  const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
+  const std::size_t diagonal_doubles = diagonal_.size() / slices;
+  const EliminateInput in{&batches_,      &chunks_, cameras_.data(),
+                          points_.data(), damping,  points_held_};
+  std::vector<EliminateOutput> outputs(slices);
+  threads_.for_each(slices, [&](std::size_t s) {
+    Buffer<double>& scratch = scratch_[threads_.worker()];
+    if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
+    const SliceSums sums{tiles_.data() + s * tile_doubles, &diagonal_[s * diagonal_doubles]};
+    std::fill_n(sums.tiles, tile_doubles, 0.0);
+    std::fill_n(sums.diagonal, diagonal_doubles, 0.0);
+    outputs[s] = {factors_.data(), 0, 0, 0};
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      kernels_.eliminate(in, chunks_.chunks[c], sums, scratch.data(), outputs[s]);
+  });
+  add_slices();
+  return collect_step(damping, outputs);
+}
+
+/// Adds the slices' sums into the first slice's, in order.
+void BundleSystem::add_slices() {
+  const std::size_t slices = chunks_.slices.size() - 1;
+  const auto add = [&](Buffer<double>& sums) {
+    constexpr std::size_t kBlock = 16384;
+    const std::size_t size = sums.size() / slices;
+    threads_.for_each((size + kBlock - 1) / kBlock, [&](std::size_t b) {
+      const std::size_t first = b * kBlock, end = std::min(size, first + kBlock);
+      for (std::size_t s = 1; s < slices; ++s)
+        for (std::size_t i = first; i < end; ++i) sums[i] += sums[s * size + i];
+    });
+  };
+  add(tiles_);
+  add(diagonal_);
+}
+
+Step BundleSystem::collect_step(double damping, const std::vector<EliminateOutput>& outputs) {
+  Step step;
+  double square_sum = 0, gradient2 = 0;
+  point_decrease_ = 0;
+  for (const EliminateOutput& out : outputs) {
+    square_sum += out.square_sum;
+    point_decrease_ += out.point_decrease;
+    gradient2 = std::max(gradient2, out.gradient_max2);
+  }
+  step.cost = square_sum / 2;
+  // w is whitened by V (1 + damping): undo the damping's part.
+  step.gradient_max = std::sqrt(gradient2 * (1 + damping));
+  vectors_.gather({&chunks_, tiles_.data(), diagonal_.data()}, columns_);
+  for (std::int32_t c = 0; c < columns_.count; ++c) {
+    const double square = std::clamp(vectors_.squares[c], kDiagonalFloor, kDiagonalCeiling);
+    damping_[c] = damping * square;
+    step.gradient_max = std::max(step.gradient_max, std::abs(vectors_.rhs[c]) / std::sqrt(square));
+  }
+  step.solved = std::isfinite(square_sum) && solve_cameras();
+  return step;
+}
+
+bool BundleSystem::solve_cameras() {
+  if (columns_.count == 0) return true;
+  const ReducedSums sums{&chunks_, tiles_.data(), diagonal_.data()};
+  const bool solved =
+      dense_ ? dense_->solve(sums, vectors_, damping_.data(), threads_, camera_step_)
+             : solve_blocks(sums, columns_, vectors_, damping_.data(), threads_, camera_step_);
+  return solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
+                               [](double x) { return std::isfinite(x); });
+}
+
+/// Steps every camera; returns the largest relative change of a block: radians for rotations,
+/// relative to its length for translations and focal lengths, absolute for the distortion (it
+/// stands beside 1).
+double BundleSystem::step_cameras() {
+  double largest = 0;
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const std::int32_t* c = columns_.image(i);
+    std::array<double, 9> d{};
+    for (int k = 0; k < 9; ++k)
+      if (c[k] >= 0) d[k] = camera_step_[c[k]];
+    const RigidMotion<double>& pose = poses_[i];
+    if (c[0] >= 0) trial_poses_[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
+    const std::uint32_t lens = image_camera_[i];
+    const auto& k = lenses_[lens];
+    for (int j = 0; j < 3; ++j)
+      if (c[6 + j] >= 0) trial_lenses_[lens][j] = k[j] + d[6 + j];
+    double* step = &cameras_[kCameraRecord * i + camera_record::kStep];
+    const double all[9] = {d[3], d[4], d[5], d[0], d[1],
+                           d[2], d[6], k[1] * d[6] + k[0] * d[7], k[2] * d[6] + k[0] * d[8]};
+    std::copy(all, all + 9, step);
+    write_camera_record(i, trial_poses_[i], trial_lenses_[lens].data(), trial_cameras_.data());
+    const auto norm = [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); };
+    const auto& t = pose.translation;
+    for (double change :
+         {norm(d[3], d[4], d[5]), norm(d[0], d[1], d[2]) / (norm(t[0], t[1], t[2]) + 1e-300),
+          std::abs(d[6]) / (std::abs(k[0]) + 1e-300), std::abs(d[7]), std::abs(d[8])})
+      largest = std::max(largest, change);
+  }
+  return largest;
+}
+
+Trial BundleSystem::trial() {
+  Trial out;
+  out.step_norm = step_cameras();
+  const std::size_t slices = chunks_.slices.size() - 1;
+  const TrialInput in{&batches_,       cameras_.data(), trial_cameras_.data(), points_.data(),
+                      factors_.data(), watch_behind_};
+  std::vector<TrialOutput> outputs(slices);
+  threads_.for_each(slices, [&](std::size_t s) {
+    outputs[s] = {trial_points_.data(), 0, 0, 0, 0};
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      kernels_.trial(in, chunks_.chunks[c], outputs[s]);
+  });
+  double decrease = point_decrease_, square_sum = 0, step2 = 0;
+  for (const TrialOutput& o : outputs) {
+    square_sum += o.square_sum;
+    decrease += o.damping_term;
+    step2 = std::max(step2, o.step2_max);
+    out.newly_behind += o.newly_behind;
+  }
+  for (std::int32_t c = 0; c < columns_.count; ++c)
+    decrease += camera_step_[c] * (vectors_.rhs[c] + damping_[c] * camera_step_[c]);
+  out.cost = square_sum / 2;
+  out.predicted_decrease = decrease / 2;
+  out.step_norm = std::max(out.step_norm, std::sqrt(step2));
+  return out;
+}
+
+void BundleSystem::accept() {
+  std::swap(poses_, trial_poses_);
+  std::swap(lenses_, trial_lenses_);
+  std::swap(cameras_, trial_cameras_);
+  std::swap(points_, trial_points_);
+}
+
+void BundleSystem::store(Problem& problem) const {
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    problem.poses[i].rotation = poses_[i].rotation;
+    problem.poses[i].translation = poses_[i].translation;
+  }
+  for (std::size_t i = 0; i < lenses_.size(); ++i) problem.cameras[i].parameters = lenses_[i];
+  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
+    for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {
+      double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+      for (int d = 0; d < 3; ++d) X[d] = points_[kPointGroup * g + 8 * d + l];
+    }
+}
+
+std::uint64_t BundleSystem::count_behind() {
+  std::uint64_t count = 0;
+  for (const Chunk& chunk : chunks_.chunks)
+    count += kernels_.count_behind(batches_, cameras_.data(), points_.data(), chunk);
+  return count;
+}
+
+std::uint64_t BundleSystem::bytes() const {
+  const auto size = [](const auto& v) { return v.size() * sizeof(v[0]); };
+  std::uint64_t sum = batches_.image.bytes() + batches_.uniform.bytes() + batches_.xy.bytes() +
+                      size(batches_.groups) + size(batches_.lane_point);
+  sum += size(chunks_.pairs) + size(chunks_.diagonal) + size(chunks_.pair_runs) +
+         size(chunks_.diagonal_runs) + size(chunks_.tiles);
+  sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
+         factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
+  sum += scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
+  if (dense_) sum += DenseCameraSolver::bytes(columns_.count);
+  return sum;
+}
+
+}  // namespace sheaf

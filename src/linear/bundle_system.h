@@ -1,0 +1,73 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geometry/rigid_motion.h"
+#include "linear/camera_solver.h"
+#include "linear/chunks.h"
+#include "linear/columns.h"
+#include "linear/kernels.h"
+#include "linear/system.h"
+#include "platform/buffer.h"
+#include "platform/parallel.h"
+#include "residual/batches.h"
+#include "sheaf/error.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// Reprojection rows on CPU threads. The order of every sum is fixed by the problem: chunks within
+/// a slice in order, slices in order; so the bytes do not depend on the number of threads.
+class BundleSystem : public System {
+ public:
+  /// skip[i] != 0 leaves observation i out; watch_behind: count in each trial the observations
+  /// that newly go behind their camera. Throws std::bad_alloc.
+  BundleSystem(const Problem& problem, const Fixed& fixed, bool watch_behind,
+               const std::vector<std::uint8_t>& skip, const Kernels& kernels, Threads& threads);
+
+  Step propose(double damping) override;
+  Trial trial() override;
+  void accept() override;
+  void store(Problem& problem) const override;
+
+  /// Observations behind their camera at the held state.
+  std::uint64_t count_behind();
+  bool couples_images() const { return !chunks_.tiles.empty(); }
+  std::uint64_t bytes() const;
+
+ private:
+  void fill_state(const Problem& problem);
+  void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
+                           const double* parameters, double* records);
+  void add_slices();
+  Step collect_step(double damping, const std::vector<EliminateOutput>& outputs);
+  bool solve_cameras();
+  double step_cameras();
+
+  const bool points_held_, watch_behind_;
+  const Kernels& kernels_;
+  Threads& threads_;
+  Batches batches_;
+  Chunks chunks_;
+  Columns columns_;
+
+  // The state held and the one tried.
+  std::vector<RigidMotion<double>> poses_, trial_poses_;
+  std::vector<std::uint32_t> image_camera_;
+  std::vector<std::array<double, 3>> lenses_, trial_lenses_;
+  Buffer<double> cameras_, trial_cameras_;  ///< kCameraRecord per image
+  Buffer<double> points_, trial_points_;    ///< kPointGroup per group
+
+  Buffer<double> factors_;              ///< kFactorGroup per group
+  Buffer<double> tiles_, diagonal_;     ///< one set per slice, the first ends up as the sum
+  std::vector<Buffer<double>> scratch_; ///< one per thread
+  CameraVectors vectors_;
+  Buffer<double> damping_, camera_step_;
+  std::unique_ptr<DenseCameraSolver> dense_;
+  double point_decrease_ = 0;
+};
+
+}  // namespace sheaf

@@ -1,0 +1,216 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Linearise a chunk, factor its points' 3x3 blocks and write the records that the products need:
+//   V + D = L L^T,  B = Jp L^-T,  T = Jc^T B,  M = I - B B^T = Lm Lm^T,  C = Lm^T Jc,
+//   w = L^-1 g,  h = Lm^-1 (r + B w),  so that S_ii = sum C^T C and b_i = -sum C^T h.
+#if defined(SHEAF_LINEAR_ELIMINATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHEAF_LINEAR_ELIMINATE_INL_H_
+#undef SHEAF_LINEAR_ELIMINATE_INL_H_
+#else
+#define SHEAF_LINEAR_ELIMINATE_INL_H_
+#endif
+
+#include "linear/kernels.h"
+#include "residual/bal_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+/// Lower triangle of a 3x3 factor, diagonal inverted.
+struct Factor {
+  V i00, l10, l20, i11, l21, i22;
+};
+
+HWY_INLINE V inverse_sqrt(V x) { return hn::Div(set(1.0), hn::Sqrt(x)); }
+
+HWY_INLINE Factor factor3(V v00, V v01, V v02, V v11, V v12, V v22) {
+  Factor f;
+  f.i00 = inverse_sqrt(v00);
+  f.l10 = hn::Mul(v01, f.i00);
+  f.l20 = hn::Mul(v02, f.i00);
+  f.i11 = inverse_sqrt(fnma(f.l10, f.l10, v11));
+  f.l21 = hn::Mul(fnma(f.l10, f.l20, v12), f.i11);
+  f.i22 = inverse_sqrt(fnma(f.l21, f.l21, fnma(f.l20, f.l20, v22)));
+  return f;
+}
+
+/// L^-1 s.
+HWY_INLINE void forward(const Factor& f, const V* s, V* out) {
+  out[0] = hn::Mul(s[0], f.i00);
+  out[1] = hn::Mul(fnma(f.l10, out[0], s[1]), f.i11);
+  out[2] = hn::Mul(fnma(f.l21, out[1], fnma(f.l20, out[0], s[2])), f.i22);
+}
+
+/// Normal equations of a point: V (upper triangle) and g = -Jp^T r.
+struct PointSums {
+  V v00, v01, v02, v11, v12, v22;
+  V g[3];
+
+  HWY_INLINE void clear() {
+    v00 = v01 = v02 = v11 = v12 = v22 = zero();
+    g[0] = g[1] = g[2] = zero();
+  }
+  HWY_INLINE void add(const LaneJacobian& j) {
+    const V *a = j.point[0], *b = j.point[1];
+    v00 = fma(a[0], a[0], fma(b[0], b[0], v00));
+    v01 = fma(a[0], a[1], fma(b[0], b[1], v01));
+    v02 = fma(a[0], a[2], fma(b[0], b[2], v02));
+    v11 = fma(a[1], a[1], fma(b[1], b[1], v11));
+    v12 = fma(a[1], a[2], fma(b[1], b[2], v12));
+    v22 = fma(a[2], a[2], fma(b[2], b[2], v22));
+    for (int i = 0; i < 3; ++i) g[i] = fnma(a[i], j.r[0], fnma(b[i], j.r[1], g[i]));
+  }
+};
+
+HWY_INLINE void save(const LaneJacobian& j, double* to) {
+  store(j.r[0], to), store(j.r[1], to + kLanes);
+  for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 9; ++i) store(j.camera[r][i], to + (2 + 9 * r + i) * kLanes);
+    for (int i = 0; i < 3; ++i) store(j.point[r][i], to + (20 + 3 * r + i) * kLanes);
+  }
+}
+
+HWY_INLINE LaneJacobian restore(const double* from) {
+  LaneJacobian j;
+  j.r[0] = load(from), j.r[1] = load(from + kLanes);
+  for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 9; ++i) j.camera[r][i] = load(from + (2 + 9 * r + i) * kLanes);
+    for (int i = 0; i < 3; ++i) j.point[r][i] = load(from + (20 + 3 * r + i) * kLanes);
+  }
+  return j;
+}
+
+/// Writes the T and C records of one observation per lane.
+HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w, double* T,
+                              double* C) {
+  V b[2][3];
+  for (int r = 0; r < 2; ++r) forward(f, j.point[r], b[r]);
+  const V q0 = fma(b[0][0], w[0], fma(b[0][1], w[1], fma(b[0][2], w[2], j.r[0])));
+  const V q1 = fma(b[1][0], w[0], fma(b[1][1], w[1], fma(b[1][2], w[2], j.r[1])));
+  const V one = set(1.0), tiny = set(1e-20);
+  V m00 = fnma(b[0][0], b[0][0], fnma(b[0][1], b[0][1], fnma(b[0][2], b[0][2], one)));
+  V m01 = hn::Neg(fma(b[0][0], b[1][0], fma(b[0][1], b[1][1], hn::Mul(b[0][2], b[1][2]))));
+  V m11 = fnma(b[1][0], b[1][0], fnma(b[1][1], b[1][1], fnma(b[1][2], b[1][2], one)));
+  m00 = hn::Max(m00, tiny);
+  const V i0 = inverse_sqrt(m00);
+  const V l00 = hn::Mul(m00, i0), l10 = hn::Mul(m01, i0);
+  m11 = hn::Max(fnma(l10, l10, m11), tiny);
+  const V i1 = inverse_sqrt(m11);
+  const V l11 = hn::Mul(m11, i1);
+  const V h0 = hn::Mul(q0, i0);
+  const V h1 = hn::Mul(fnma(l10, h0, q1), i1);
+
+  V fields[8], last[8];
+  for (int i = 0; i < 8; ++i)
+    fields[i] = fma(l00, j.camera[0][i], hn::Mul(l10, j.camera[1][i]));
+  store_records(fields, C, kCRecord);
+  for (int i = 0; i < 8; ++i) fields[i] = hn::Mul(l11, j.camera[1][i]);
+  store_records(fields, C + 8, kCRecord);
+  for (int q = 0; q < 3; ++q) {
+    for (int i = 0; i < 8; ++i)
+      fields[i] = fma(j.camera[0][i], b[0][q], hn::Mul(j.camera[1][i], b[1][q]));
+    store_records(fields, T + 8 * q, kTRecord);
+    last[q] = fma(j.camera[0][8], b[0][q], hn::Mul(j.camera[1][8], b[1][q]));
+  }
+  last[3] = zero();
+  last[4] = fma(l00, j.camera[0][8], hn::Mul(l10, j.camera[1][8]));
+  last[5] = hn::Mul(l11, j.camera[1][8]);
+  last[6] = h0;
+  last[7] = h1;
+  store_records(last, T + 24, kTRecord);
+}
+
+/// Marquardt's damping of the points: D = lambda diag(V), clamped.
+HWY_INLINE V damp(V lambda, V v) {
+  return hn::Mul(lambda, hn::Min(hn::Max(v, set(kDiagonalFloor)), set(kDiagonalCeiling)));
+}
+
+struct EliminateSums {
+  V square[kParts], decrease[kParts], gradient2[kParts];
+};
+
+HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& group,
+                               std::size_t g, int part, double* jacobians, double* T, double* C,
+                               double* factors, EliminateSums& sums) {
+  const Batches& batches = *in.batches;
+  const int lane = part * kLanes;
+  const double* X = in.points + kPointGroup * g + lane;
+  const V X0 = load(X), X1 = load(X + 8), X2 = load(X + 16);
+  const V mask = lane_mask(group.lanes, lane);
+  const V* scale = group.lanes < 8 ? &mask : nullptr;
+  PointSums p;
+  p.clear();
+  V square = sums.square[part];
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t b = group.first_batch + o;
+    V c[16];
+    load_cameras<2>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    const double* z = &batches.xy[16 * b + lane];
+    const LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), scale);
+    square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
+    p.add(j);
+    save(j, jacobians + kJacobianFields * kLanes * o);
+  }
+  sums.square[part] = square;
+
+  const V lambda = set(in.damping);
+  V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
+  Factor f = factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12,
+                     hn::Add(p.v22, D2));
+  if (in.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
+    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
+    D0 = D1 = D2 = zero();
+  }
+  V w[3];
+  forward(f, p.g, w);
+  const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
+  sums.decrease[part] = hn::Add(sums.decrease[part], w2);
+  sums.gradient2[part] = hn::Max(sums.gradient2[part], w2);
+  double* out = factors + kFactorGroup * g + lane;
+  const V all[12] = {f.i00, f.l10, f.l20, f.i11, f.l21, f.i22, w[0], w[1], w[2], D0, D1, D2};
+  for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
+
+  for (std::uint32_t o = 0; o < group.track; ++o)
+    write_records(restore(jacobians + kJacobianFields * kLanes * o), f, w,
+                  T + kTRecord * (8 * o + lane), C + kCRecord * (8 * o + lane));
+}
+
+HWY_INLINE double sum_parts(const V* parts) {
+  alignas(64) double lanes[8];
+  for (int p = 0; p < kParts; ++p) store(parts[p], lanes + p * kLanes);
+  return sum8(lanes);
+}
+
+HWY_INLINE double max_parts(const V* parts) {
+  alignas(64) double lanes[8];
+  for (int p = 0; p < kParts; ++p) store(parts[p], lanes + p * kLanes);
+  double most = 0;
+  for (double x : lanes) most = x > most ? x : most;
+  return most;
+}
+
+inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, double* jacobians,
+                            double* T, double* C, EliminateOutput& out) {
+  EliminateSums sums;
+  for (int p = 0; p < kParts; ++p)
+    sums.square[p] = sums.decrease[p] = sums.gradient2[p] = zero();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group group = in.batches->groups[g];
+    const std::size_t record = 8 * (group.first_batch - chunk.first_batch);
+    for (int p = 0; p < kParts; ++p)
+      eliminate_part(in, group, g, p, jacobians, T + kTRecord * record, C + kCRecord * record,
+                     out.factors, sums);
+  }
+  out.square_sum += sum_parts(sums.square);
+  out.point_decrease += sum_parts(sums.decrease);
+  const double gradient2 = max_parts(sums.gradient2);
+  out.gradient_max2 = gradient2 > out.gradient_max2 ? gradient2 : out.gradient_max2;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

@@ -1,0 +1,85 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "linear/kernels.h"
+
+#include "linear/kernel_table.h"
+#include "platform/simd_targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "linear/kernels.cc"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+// After foreach_target.h:
+#include <hwy/highway.h>
+
+#include "linear/eliminate-inl.h"
+#include "linear/products-inl.h"
+#include "linear/trial-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+void eliminate(const EliminateInput& in, const Chunk& chunk, const SliceSums& sums,
+               Scratch scratch, EliminateOutput& out) {
+  double* T = scratch;
+  double* C = T + kTRecord * 8 * in.chunks->most_batches;
+  double* jacobians = C + kCRecord * 8 * in.chunks->most_batches;
+  linearize_chunk(in, chunk, jacobians, T, C, out);
+  diagonal_products(*in.chunks, chunk, T, C, sums.diagonal);
+  pair_products(*in.chunks, chunk, T, sums.tiles);
+}
+
+void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
+  trial_chunk(in, chunk, out);
+}
+
+double square_sum(const Batches& batches, const double* cameras, const double* points,
+                  const Chunk& chunk) {
+  return square_sum_chunk(batches, cameras, points, chunk);
+}
+
+std::uint64_t count_behind(const Batches& batches, const double* cameras, const double* points,
+                           const Chunk& chunk) {
+  return count_behind_chunk(batches, cameras, points, chunk);
+}
+
+Kernels table(const char* name, bool fused) {
+  return {name, fused, &eliminate, &trial, &square_sum, &count_behind};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sheaf {
+
+std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
+  return (kTRecord + kCRecord) * 8 * chunks.most_batches +
+         std::size_t(26 * 8) * batches.longest_track;
+}
+
+std::vector<const Kernels*> available_kernels() {
+  std::vector<const Kernels*> out;
+  const std::int64_t supported = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+  static const Kernels avx512 = N_AVX3::table("avx512", true);
+  if (supported & HWY_AVX3) out.push_back(&avx512);
+#endif
+#if HWY_TARGETS & HWY_AVX2
+  static const Kernels avx2 = N_AVX2::table("avx2", true);
+  if (supported & HWY_AVX2) out.push_back(&avx2);
+#endif
+#if HWY_TARGETS & HWY_SSE4
+  static const Kernels sse4 = N_SSE4::table("sse4", false);
+  if (supported & HWY_SSE4) out.push_back(&sse4);
+#endif
+  static const Kernels baseline = HWY_STATIC_DISPATCH(table)(
+      HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline", false);
+  out.push_back(&baseline);
+  (void)supported;
+  return out;
+}
+
+}  // namespace sheaf
+#endif  // HWY_ONCE

@@ -1,0 +1,104 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "linear/chunks.h"
+#include "residual/batches.h"
+
+namespace sheaf {
+
+/// The camera side of the state as the kernels read it, 24 doubles per image:
+///   R (9, row-major), t (3), f, k1, k2, then the step to back-substitute:
+///   phi (3), rho (3), df, k1 df + f dk1, k2 df + f dk2.
+constexpr std::size_t kCameraRecord = 24;
+namespace camera_record {
+constexpr int kRotation = 0, kTranslation = 9, kFocal = 12, kStep = 15;
+}
+
+/// Points: 24 doubles per group: X of the eight lanes, then Y, then Z.
+constexpr std::size_t kPointGroup = 24;
+/// What elimination leaves per group, 8 lanes each: the factor L^-1 with V + D = L L^T stored as
+/// i00, l10, l20, i11, l21, i22 (diagonal inverted), w = L^-1 g (3), D (3).
+constexpr std::size_t kFactorGroup = 96;
+
+/// Column order of a camera block: rho (3), phi (3), f, k1, k2.
+constexpr int kCameraColumns = 9;
+
+/// Sums of one slice. A tile holds T_a T_b^T of the pair (row, column): rows 0..7 x columns 0..7
+/// row-major (64), row 8 x columns 0..7 (8), rows 0..7 x column 8 (8), (8, 8), 7 unused.
+constexpr std::size_t kTileDoubles = 88;
+/// Per image: sum C^T C rows 0..7 x columns 0..7 (64), row 8 x columns 0..7 (8), sum C^T h columns
+/// 0..7 (8), sum of squares of T columns 0..7 (8), then (8, 8), h of column 8, squares of T column
+/// 8, 5 unused.
+constexpr std::size_t kDiagonalDoubles = 96;
+
+struct SliceSums {
+  double* tiles;     ///< kTileDoubles per tile
+  double* diagonal;  ///< kDiagonalDoubles per image
+};
+
+struct EliminateInput {
+  const Batches* batches;
+  const Chunks* chunks;
+  const double* cameras;  ///< kCameraRecord per image
+  const double* points;   ///< kPointGroup per group
+  double damping;         ///< lambda: D = lambda diag(V), clamped as below
+  bool points_held;
+};
+/// diag(J^T J) is clamped to this range before it is scaled by lambda.
+constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
+
+struct EliminateOutput {
+  double* factors;       ///< kFactorGroup per group
+  double square_sum;     ///< sum |r|^2
+  double point_decrease; ///< sum |w|^2
+  double gradient_max2;  ///< largest |w|^2 of a point
+};
+
+struct TrialInput {
+  const Batches* batches;
+  const double* cameras;        ///< held state, with the step
+  const double* trial_cameras;  ///< stepped
+  const double* points;
+  const double* factors;
+  bool count_newly_behind;
+};
+struct TrialOutput {
+  double* points;            ///< stepped
+  double square_sum;         ///< sum |r|^2 at the stepped state
+  double damping_term;       ///< sum d^T D d over points
+  double step2_max;          ///< largest |d|^2 / |X|^2 of a point
+  std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
+};
+
+/// Scratch of one thread, from Kernels::scratch_doubles.
+using Scratch = double*;
+
+/// One instruction set's hot kernels over one chunk. docs/math.md has the algebra.
+struct Kernels {
+  const char* name;
+  bool fused;  ///< uses fused multiply-add: agrees bit for bit with the others that do
+
+  /// Linearises and eliminates the chunk's points; adds to the slice's sums and to `out`.
+  void (*eliminate)(const EliminateInput&, const Chunk&, const SliceSums&, Scratch,
+                    EliminateOutput& out);
+  /// Back-substitutes the chunk's points and evaluates the cost there; adds to `out`.
+  void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
+  /// Sum |r|^2 of the chunk.
+  double (*square_sum)(const Batches&, const double* cameras, const double* points, const Chunk&);
+  /// Observations of the chunk whose point lies behind its camera (P.z > 0).
+  std::uint64_t (*count_behind)(const Batches&, const double* cameras, const double* points,
+                                const Chunk&);
+};
+
+/// Doubles of scratch that `eliminate` needs for any of these chunks.
+std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
+
+/// Records of the elimination in scratch: T, 32 doubles per record (three columns of L^-T W^T, rows
+/// 0..7 each; then row 8 of the three, 0, C row 8 (2), h (2)); C, 16 doubles per record.
+constexpr std::size_t kTRecord = 32, kCRecord = 16;
+
+}  // namespace sheaf

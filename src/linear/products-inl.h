@@ -1,0 +1,129 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Sums of products over the records of a chunk: the diagonal blocks and right-hand side of the
+// reduced camera system, and its off-diagonal blocks. A block is 8 + 1 columns: eight in a vector,
+// the ninth beside it. Accumulators stay in registers over a run of records of one image (pair).
+#if defined(SHEAF_LINEAR_PRODUCTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHEAF_LINEAR_PRODUCTS_INL_H_
+#undef SHEAF_LINEAR_PRODUCTS_INL_H_
+#else
+#define SHEAF_LINEAR_PRODUCTS_INL_H_
+#endif
+
+#include "linear/kernels.h"
+#include "platform/simd-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+/// a[k] += x[k] v for k < 8, where x is an eight-double record and `loaded` its register.
+HWY_INLINE void outer8(const double* x, V loaded, V v, V* a) {
+  a[0] = fma(broadcast<0>(x, loaded), v, a[0]);
+  a[1] = fma(broadcast<1>(x, loaded), v, a[1]);
+  a[2] = fma(broadcast<2>(x, loaded), v, a[2]);
+  a[3] = fma(broadcast<3>(x, loaded), v, a[3]);
+  a[4] = fma(broadcast<4>(x, loaded), v, a[4]);
+  a[5] = fma(broadcast<5>(x, loaded), v, a[5]);
+  a[6] = fma(broadcast<6>(x, loaded), v, a[6]);
+  a[7] = fma(broadcast<7>(x, loaded), v, a[7]);
+}
+
+HWY_INLINE void add_to(V v, double* p) { store(hn::Add(load(p), v), p); }
+
+/// Columns [8 part / kParts, ...) of one image's diagonal block, and its right-hand side.
+HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count, int part,
+                              const double* T, const double* C, double* sums) {
+  const int column = part * kLanes;
+  V a[8], a8 = zero(), rhs = zero(), squares = zero();
+  for (V& x : a) x = zero();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double* c = C + kCRecord * records[i];
+    const double* t = T + kTRecord * records[i];
+    const V c0 = load(c + column), c1 = load(c + 8 + column);
+    outer8(c, c0, c0, a);
+    outer8(c + 8, c1, c1, a);
+    a8 = fma(set(t[28]), c0, fma(set(t[29]), c1, a8));
+    rhs = fma(set(t[30]), c0, fma(set(t[31]), c1, rhs));
+    const V t0 = load(t + column), t1 = load(t + 8 + column), t2 = load(t + 16 + column);
+    squares = fma(t0, t0, fma(t1, t1, fma(t2, t2, squares)));
+  }
+  for (int k = 0; k < 8; ++k) add_to(a[k], sums + 8 * k + column);
+  add_to(a8, sums + 64 + column);
+  add_to(rhs, sums + 72 + column);
+  add_to(squares, sums + 80 + column);
+}
+
+/// The ninth column's own entries: (8, 8), its right-hand side, its squares of T.
+HWY_INLINE void diagonal_corner(const std::uint16_t* records, std::uint32_t count, const double* T,
+                                double* sums) {
+  double corner = 0, rhs = 0, squares = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double* t = T + kTRecord * records[i] + 24;
+    corner += t[4] * t[4] + t[5] * t[5];
+    rhs += t[4] * t[6] + t[5] * t[7];
+    squares += t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
+  }
+  sums[88] += corner, sums[89] += rhs, sums[90] += squares;
+}
+
+inline void diagonal_products(const Chunks& chunks, const Chunk& chunk, const double* T,
+                              const double* C, double* sums) {
+  for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
+    const DiagonalRun run = chunks.diagonal_runs[i];
+    const std::uint16_t* records = &chunks.diagonal[run.first];
+    double* to = sums + kDiagonalDoubles * run.image;
+    for (int p = 0; p < kParts; ++p) diagonal_part(records, run.count, p, T, C, to);
+    diagonal_corner(records, run.count, T, to);
+  }
+}
+
+/// tile += sum T_a T_b^T, columns of this part (and rows of this part of the ninth column).
+HWY_INLINE void pair_part(const RecordPair* pairs, std::uint32_t count, int part, const double* T,
+                          double* tile) {
+  const int column = part * kLanes;
+  V a[8], a8 = zero(), a9 = zero();
+  for (V& x : a) x = zero();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double* ti = T + kTRecord * pairs[i].a;
+    const double* tj = T + kTRecord * pairs[i].b;
+    for (int q = 0; q < 3; ++q) {
+      const V vi = load(ti + 8 * q + column), vj = load(tj + 8 * q + column);
+      outer8(ti + 8 * q, vi, vj, a);
+      a8 = fma(set(ti[24 + q]), vj, a8);
+      a9 = fma(set(tj[24 + q]), vi, a9);
+    }
+  }
+  for (int k = 0; k < 8; ++k) add_to(a[k], tile + 8 * k + column);
+  add_to(a8, tile + 64 + column);
+  add_to(a9, tile + 72 + column);
+}
+
+HWY_INLINE void pair_corner(const RecordPair* pairs, std::uint32_t count, const double* T,
+                            double* tile) {
+  double corner = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double* ti = T + kTRecord * pairs[i].a + 24;
+    const double* tj = T + kTRecord * pairs[i].b + 24;
+    corner += ti[0] * tj[0] + ti[1] * tj[1] + ti[2] * tj[2];
+  }
+  tile[80] += corner;
+}
+
+inline void pair_products(const Chunks& chunks, const Chunk& chunk, const double* T,
+                          double* tiles) {
+  for (std::uint64_t i = chunk.first_pair_run; i < chunk.end_pair_run; ++i) {
+    const PairRun run = chunks.pair_runs[i];
+    const RecordPair* pairs = &chunks.pairs[run.first];
+    double* tile = tiles + kTileDoubles * run.tile;
+    for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, T, tile);
+    pair_corner(pairs, run.count, T, tile);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

@@ -1,0 +1,297 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The kernels once more as plain scalar code, one observation at a time: what the fast ones are
+// tested against. Written for reading, not for speed.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "geometry/bal_camera.h"
+#include "linear/kernel_table.h"
+
+namespace sheaf {
+namespace {
+
+struct Observed {
+  Matrix3<double> R;
+  Vector3<double> t;
+  BalCamera<double> camera;
+};
+
+Observed camera_of(const double* cameras, std::uint32_t image) {
+  const double* c = cameras + kCameraRecord * image;
+  Observed o;
+  std::copy(c, c + 9, o.R.begin());
+  std::copy(c + 9, c + 12, o.t.begin());
+  o.camera = {c[12], c[13], c[14]};
+  return o;
+}
+
+Vector3<double> point_of(const double* points, std::size_t group, std::uint32_t lane) {
+  const double* X = points + kPointGroup * group + lane;
+  return {X[0], X[8], X[16]};
+}
+
+/// One observation with its residual and the exact Jacobians.
+struct Row {
+  std::array<double, 2> r;
+  BalJacobian<double> j;
+};
+
+Row row_of(const Batches& batches, const double* cameras, const Vector3<double>& X,
+           std::uint64_t batch, std::uint32_t lane) {
+  const Observed o = camera_of(cameras, batches.image[8 * batch + lane]);
+  Row row;
+  row.j = project_with_jacobian(o.R, o.t, o.camera, X);
+  row.r = {row.j.pixel[0] - batches.xy[16 * batch + lane],
+           row.j.pixel[1] - batches.xy[16 * batch + 8 + lane]};
+  return row;
+}
+
+/// Lower factor L of V + D, with the solve by L.
+struct Factor3 {
+  double l00 = 0, l10 = 0, l20 = 0, l11 = 0, l21 = 0, l22 = 0;
+  bool held = false;
+
+  static Factor3 of(const std::array<double, 9>& A) {
+    Factor3 f;
+    f.l00 = std::sqrt(A[0]);
+    f.l10 = A[3] / f.l00;
+    f.l20 = A[6] / f.l00;
+    f.l11 = std::sqrt(A[4] - f.l10 * f.l10);
+    f.l21 = (A[7] - f.l10 * f.l20) / f.l11;
+    f.l22 = std::sqrt(A[8] - f.l20 * f.l20 - f.l21 * f.l21);
+    return f;
+  }
+  Vector3<double> forward(const double* s) const {
+    if (held) return {0, 0, 0};
+    Vector3<double> y;
+    y[0] = s[0] / l00;
+    y[1] = (s[1] - l10 * y[0]) / l11;
+    y[2] = (s[2] - l20 * y[0] - l21 * y[1]) / l22;
+    return y;
+  }
+};
+
+void store_factor(const Factor3& f, const Vector3<double>& w, const Vector3<double>& D,
+                  double* out) {
+  std::array<double, 12> all{1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22,
+                             w[0],      w[1],  w[2],  D[0],      D[1],  D[2]};
+  if (f.held) all.fill(0);
+  for (int i = 0; i < 12; ++i) out[8 * i] = all[i];
+}
+
+void write_record(const Row& row, const Factor3& f, const Vector3<double>& w, double* T,
+                  double* C) {
+  const auto& Jc = row.j.camera;
+  const Vector3<double> B0 = f.forward(&row.j.point[0]), B1 = f.forward(&row.j.point[3]);
+  double q[2] = {row.r[0], row.r[1]}, m00 = 1, m01 = 0, m11 = 1;
+  for (int i = 0; i < 3; ++i) {
+    q[0] += B0[i] * w[i], q[1] += B1[i] * w[i];
+    m00 -= B0[i] * B0[i], m01 -= B0[i] * B1[i], m11 -= B1[i] * B1[i];
+  }
+  const double l00 = std::sqrt(std::max(m00, 1e-20)), l10 = m01 / l00;
+  const double l11 = std::sqrt(std::max(m11 - l10 * l10, 1e-20));
+  for (int k = 0; k < 9; ++k) {
+    const double c0 = l00 * Jc[k] + l10 * Jc[9 + k], c1 = l11 * Jc[9 + k];
+    (k < 8 ? C[k] : T[28]) = c0;
+    (k < 8 ? C[8 + k] : T[29]) = c1;
+    for (int i = 0; i < 3; ++i)
+      (k < 8 ? T[8 * i + k] : T[24 + i]) = Jc[k] * B0[i] + Jc[9 + k] * B1[i];
+  }
+  T[27] = 0;
+  T[30] = q[0] / l00;
+  T[31] = (q[1] - l10 * T[30]) / l11;
+}
+
+void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g,
+                     std::uint32_t lane, double* T, double* C, EliminateOutput& out) {
+  const Batches::Group& group = in.batches->groups[g];
+  const Vector3<double> X = point_of(in.points, g, lane);
+  std::array<double, 9> A{};
+  Vector3<double> gradient{}, D;
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const Row row = row_of(*in.batches, in.cameras, X, group.first_batch + o, lane);
+    out.square_sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
+    for (int e = 0; e < 2; ++e)
+      for (int i = 0; i < 3; ++i) {
+        gradient[i] -= row.j.point[3 * e + i] * row.r[e];
+        for (int k = 0; k < 3; ++k) A[3 * i + k] += row.j.point[3 * e + i] * row.j.point[3 * e + k];
+      }
+  }
+  for (int i = 0; i < 3; ++i) {
+    D[i] = in.damping * std::clamp(A[4 * i], kDiagonalFloor, kDiagonalCeiling);
+    A[4 * i] += D[i];
+  }
+  Factor3 f = Factor3::of(A);
+  f.held = in.points_held;
+  const Vector3<double> w = f.forward(gradient.data());
+  const double w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+  out.point_decrease += w2;
+  out.gradient_max2 = std::max(out.gradient_max2, w2);
+  store_factor(f, w, D, out.factors + kFactorGroup * g + lane);
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t record = 8 * (group.first_batch + o - chunk.first_batch) + lane;
+    write_record(row_of(*in.batches, in.cameras, X, group.first_batch + o, lane), f, w,
+                 T + kTRecord * record, C + kCRecord * record);
+  }
+}
+
+/// Entry k of the three columns of T, and of the two rows of C: 8 + 1 storage undone.
+double t_entry(const double* T, int column, int k) { return k < 8 ? T[8 * column + k] : T[24 + column]; }
+double c_entry(const double* T, const double* C, int row, int k) {
+  return k < 8 ? C[8 * row + k] : T[28 + row];
+}
+
+void add_diagonal(const double* T, const double* C, double* to) {
+  for (int i = 0; i < 9; ++i) {
+    for (int k = 0; k < 9; ++k) {
+      const double s = c_entry(T, C, 0, i) * c_entry(T, C, 0, k) +
+                       c_entry(T, C, 1, i) * c_entry(T, C, 1, k);
+      if (k < 8) to[8 * i + k] += s;
+      if (k == 8 && i == 8) to[88] += s;
+    }
+    double squares = 0;
+    for (int c = 0; c < 3; ++c) squares += t_entry(T, c, i) * t_entry(T, c, i);
+    const double rhs = c_entry(T, C, 0, i) * T[30] + c_entry(T, C, 1, i) * T[31];
+    to[i < 8 ? 72 + i : 89] += rhs;
+    to[i < 8 ? 80 + i : 90] += squares;
+  }
+}
+
+void add_pair(const double* Ta, const double* Tb, double* tile) {
+  for (int i = 0; i < 9; ++i)
+    for (int k = 0; k < 9; ++k) {
+      double s = 0;
+      for (int c = 0; c < 3; ++c) s += t_entry(Ta, c, i) * t_entry(Tb, c, k);
+      tile[k < 8 ? 8 * i + k : (i < 8 ? 72 + i : 80)] += s;
+    }
+}
+
+void eliminate(const EliminateInput& in, const Chunk& chunk, const SliceSums& sums,
+               Scratch scratch, EliminateOutput& out) {
+  double* T = scratch;
+  double* C = T + kTRecord * 8 * in.chunks->most_batches;
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l)
+      eliminate_point(in, chunk, g, l, T, C, out);
+  for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
+    const DiagonalRun& run = in.chunks->diagonal_runs[i];
+    for (std::uint64_t r = run.first; r < run.first + run.count; ++r) {
+      const std::size_t record = in.chunks->diagonal[r];
+      add_diagonal(T + kTRecord * record, C + kCRecord * record,
+                   sums.diagonal + kDiagonalDoubles * run.image);
+    }
+  }
+  for (std::uint64_t i = chunk.first_pair_run; i < chunk.end_pair_run; ++i) {
+    const PairRun& run = in.chunks->pair_runs[i];
+    for (std::uint64_t r = run.first; r < run.first + run.count; ++r)
+      add_pair(T + kTRecord * in.chunks->pairs[r].a, T + kTRecord * in.chunks->pairs[r].b,
+               sums.tiles + kTileDoubles * run.tile);
+  }
+}
+
+/// Jc dc, from the step in the camera record: phi, rho, df, k1 df + f dk1, k2 df + f dk2.
+std::array<double, 2> camera_motion(const Row& row, const double* record) {
+  const double* s = record + camera_record::kStep;
+  const double f = record[12];
+  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6],
+                                 (s[7] - record[13] * s[6]) / f, (s[8] - record[14] * s[6]) / f};
+  std::array<double, 2> e{};
+  for (int r = 0; r < 2; ++r)
+    for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];
+  return e;
+}
+
+Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {
+  const auto at = [&](int i) { return factor[8 * i]; };
+  const double u0 = s[0] * at(0);
+  const double u1 = (s[1] - at(1) * u0) * at(3);
+  const double u2 = (s[2] - at(2) * u0 - at(4) * u1) * at(5);
+  const double v0 = at(6) - u0, v1 = at(7) - u1, v2 = at(8) - u2;
+  Vector3<double> d;
+  d[2] = v2 * at(5);
+  d[1] = (v1 - at(4) * d[2]) * at(3);
+  d[0] = (v0 - at(1) * d[1] - at(2) * d[2]) * at(0);
+  return d;
+}
+
+double depth(const double* cameras, std::uint32_t image, const Vector3<double>& X) {
+  const Observed o = camera_of(cameras, image);
+  return multiply(o.R, X)[2] + o.t[2];
+}
+
+void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialOutput& out) {
+  const Batches& batches = *in.batches;
+  const Batches::Group& group = batches.groups[g];
+  const bool real = lane < group.lanes;
+  const Vector3<double> X = point_of(in.points, g, lane);
+  Vector3<double> s{};
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t b = group.first_batch + o;
+    const Row row = row_of(batches, in.cameras, X, b, lane);
+    const auto e =
+        camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
+    for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
+  }
+  const double* factor = in.factors + kFactorGroup * g + lane;
+  const Vector3<double> d = real ? back_substitute(factor, s) : Vector3<double>{};
+  Vector3<double> Y;
+  double d2 = 0, x2 = 1e-300;
+  for (int i = 0; i < 3; ++i) {
+    Y[i] = X[i] + d[i];
+    out.points[kPointGroup * g + 8 * i + lane] = Y[i];
+    d2 += d[i] * d[i], x2 += X[i] * X[i];
+    if (real) out.damping_term += d[i] * d[i] * factor[8 * (9 + i)];
+  }
+  if (!real) return;
+  out.step2_max = std::max(out.step2_max, d2 / x2);
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t b = group.first_batch + o;
+    const std::uint32_t image = batches.image[8 * b + lane];
+    const Row row = row_of(batches, in.trial_cameras, Y, b, lane);
+    out.square_sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
+    if (in.count_newly_behind && depth(in.trial_cameras, image, Y) > 0 &&
+        depth(in.cameras, image, X) <= 0)
+      ++out.newly_behind;
+  }
+}
+
+void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < 8; ++l) trial_point(in, g, l, out);
+}
+
+double square_sum(const Batches& batches, const double* cameras, const double* points,
+                  const Chunk& chunk) {
+  double sum = 0;
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l)
+      for (std::uint32_t o = 0; o < batches.groups[g].track; ++o) {
+        const Row row = row_of(batches, cameras, point_of(points, g, l),
+                               batches.groups[g].first_batch + o, l);
+        sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
+      }
+  return sum;
+}
+
+std::uint64_t count_behind(const Batches& batches, const double* cameras, const double* points,
+                           const Chunk& chunk) {
+  std::uint64_t count = 0;
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l)
+      for (std::uint32_t o = 0; o < batches.groups[g].track; ++o)
+        count += depth(cameras, batches.image[8 * (batches.groups[g].first_batch + o) + l],
+                       point_of(points, g, l)) > 0;
+  return count;
+}
+
+}  // namespace
+
+const Kernels& reference_kernels() {
+  static const Kernels kernels{"reference", false, &eliminate, &trial, &square_sum, &count_behind};
+  return kernels;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,49 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// A damped Gauss-Newton step was computed (or not), points eliminated, from the held state.
+struct Step {
+  bool solved = false;      ///< false: the camera system was not positive definite or not finite
+  double cost = 0;          ///< 1/2 sum |r|^2 at the held state, px^2
+  double gradient_max = 0;  ///< px: largest |J_i^T r| / |J_i| over the free columns
+  int linear_iterations = 0;
+};
+
+/// The state that the step leads to.
+struct Trial {
+  double cost = 0;                 ///< 1/2 sum |r|^2 there; not finite where the formula is not
+  double predicted_decrease = 0;   ///< of the cost, by the linear model
+  double step_norm = 0;            ///< largest relative change of any one block
+  std::uint64_t newly_behind = 0;  ///< observations that went behind their camera (if watched)
+};
+
+/// The one seam between the trust region and everything below it. Only scalars cross: state and
+/// vectors live behind it, wherever that is. The loop above calls
+///   propose(damping) -> trial() -> accept() or propose(another damping) -> ...
+class System {
+ public:
+  virtual ~System() = default;
+
+  /// Linearises at the held state, eliminates the points under (J^T J + damping diag(J^T J)) and
+  /// solves for the cameras. Asked again without accept(), the state is the same and only the
+  /// damping differs.
+  virtual Step propose(double damping) = 0;
+
+  /// Back-substitutes the points and evaluates the cost at the stepped state, in one pass.
+  virtual Trial trial() = 0;
+
+  /// The stepped state becomes the held one.
+  virtual void accept() = 0;
+
+  /// Writes the held state into the problem; what is fixed is not touched.
+  virtual void store(Problem& problem) const = 0;
+};
+
+}  // namespace sheaf

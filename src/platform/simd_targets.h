@@ -1,0 +1,11 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which instruction sets Highway compiles the kernels for; included before <hwy/...>. On x86-64
+// four are enough: what lies between them (SSSE3, AVX-512 with more integer instructions) brings
+// doubles nothing and costs code size. The slowest is plain scalar code, for any machine.
+#if defined(__x86_64__) || defined(_M_X64)
+#define HWY_BASELINE_TARGETS HWY_SCALAR
+#define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_SSE4 | HWY_AVX2 | HWY_AVX3))
+#endif

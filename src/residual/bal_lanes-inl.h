@@ -1,0 +1,118 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The BAL camera on lanes; geometry/bal_camera.h is the scalar statement of the same formulas.
+#if defined(SHEAF_RESIDUAL_BAL_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHEAF_RESIDUAL_BAL_LANES_INL_H_
+#undef SHEAF_RESIDUAL_BAL_LANES_INL_H_
+#else
+#define SHEAF_RESIDUAL_BAL_LANES_INL_H_
+#endif
+
+#include "platform/simd-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+/// The first 8 Octets fields of the 24-double camera records of kLanes images; `image` points at
+/// the part's first lane, `uniform` is the image of all lanes or negative.
+template <int Octets>
+HWY_INLINE void load_cameras(const double* cameras, const std::uint32_t* image,
+                             std::int32_t uniform, V* c) {
+  if (uniform >= 0) {
+    const double* record = cameras + 24 * static_cast<std::size_t>(uniform);
+    for (int o = 0; o < Octets; ++o) broadcast_record(record + 8 * o, c + 8 * o);
+  } else {
+    for (int o = 0; o < Octets; ++o) load_records(cameras + 8 * o, 24, image, c + 8 * o);
+  }
+}
+
+/// A point in the camera's frame and its normalised image p = -P.xy / P.z.
+struct Seen {
+  V P0, P1, P2, iz, x, y, n;
+};
+
+HWY_INLINE Seen see(const V* c, V X0, V X1, V X2) {
+  Seen s;
+  s.P0 = fma(c[0], X0, fma(c[1], X1, fma(c[2], X2, c[9])));
+  s.P1 = fma(c[3], X0, fma(c[4], X1, fma(c[5], X2, c[10])));
+  s.P2 = fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[11])));
+  s.iz = hn::Div(set(-1.0), s.P2);
+  s.x = hn::Mul(s.P0, s.iz);
+  s.y = hn::Mul(s.P1, s.iz);
+  s.n = fma(s.x, s.x, hn::Mul(s.y, s.y));
+  return s;
+}
+
+/// d = 1 + k1 n + k2 n^2.
+HWY_INLINE V distortion(const V* c, V n) { return fma(n, fma(n, c[14], c[13]), set(1.0)); }
+
+/// dd = f (2 k1 + 4 k2 n).
+HWY_INLINE V distortion_slope(const V* c, V n) {
+  const V k1 = hn::Add(c[13], c[13]);
+  const V k2 = hn::Mul(set(4.0), c[14]);
+  return hn::Mul(c[12], fma(k2, n, k1));
+}
+
+/// Residual (2), camera Jacobian (2 x 9) and point Jacobian (2 x 3) of one observation per lane.
+struct LaneJacobian {
+  V r[2], camera[2][9], point[2][3];
+};
+constexpr int kJacobianFields = 26;
+
+/// scale multiplies residual and Jacobian (0 for masked lanes); nullptr: all ones.
+HWY_INLINE LaneJacobian linearize_lanes(const V* c, V X0, V X1, V X2, V zx, V zy, const V* scale) {
+  const Seen s = see(c, X0, X1, X2);
+  V d = distortion(c, s.n);
+  V f = c[12];
+  V fd = hn::Mul(f, d);
+  const V dd = distortion_slope(c, s.n);
+  const V ddx = hn::Mul(dd, s.x);
+  LaneJacobian j;
+  j.r[0] = fms(fd, s.x, zx);
+  j.r[1] = fms(fd, s.y, zy);
+  // A = (fd I + dd p p^T) iz [I | p] = [a b a2; b e e2].
+  V a = hn::Mul(fma(ddx, s.x, fd), s.iz);
+  V b = hn::Mul(hn::Mul(ddx, s.y), s.iz);
+  V e = hn::Mul(fma(hn::Mul(dd, s.y), s.y, fd), s.iz);
+  if (scale != nullptr) {
+    const V m = *scale;
+    j.r[0] = hn::Mul(j.r[0], m), j.r[1] = hn::Mul(j.r[1], m);
+    a = hn::Mul(a, m), b = hn::Mul(b, m), e = hn::Mul(e, m), d = hn::Mul(d, m), f = hn::Mul(f, m);
+  }
+  const V a2 = fma(a, s.x, hn::Mul(b, s.y));
+  const V e2 = fma(b, s.x, hn::Mul(e, s.y));
+  const V fn = hn::Mul(f, s.n);
+  const V fnn = hn::Mul(fn, s.n);
+  j.camera[0][0] = a, j.camera[0][1] = b, j.camera[0][2] = a2;
+  j.camera[1][0] = b, j.camera[1][1] = e, j.camera[1][2] = e2;
+  j.camera[0][3] = fms(a2, s.P1, hn::Mul(b, s.P2));
+  j.camera[0][4] = fms(a, s.P2, hn::Mul(a2, s.P0));
+  j.camera[0][5] = fms(b, s.P0, hn::Mul(a, s.P1));
+  j.camera[1][3] = fms(e2, s.P1, hn::Mul(e, s.P2));
+  j.camera[1][4] = fms(b, s.P2, hn::Mul(e2, s.P0));
+  j.camera[1][5] = fms(e, s.P0, hn::Mul(b, s.P1));
+  j.camera[0][6] = hn::Mul(d, s.x), j.camera[1][6] = hn::Mul(d, s.y);
+  j.camera[0][7] = hn::Mul(fn, s.x), j.camera[1][7] = hn::Mul(fn, s.y);
+  j.camera[0][8] = hn::Mul(fnn, s.x), j.camera[1][8] = hn::Mul(fnn, s.y);
+  for (int i = 0; i < 3; ++i) {
+    j.point[0][i] = fma(a, c[i], fma(b, c[3 + i], hn::Mul(a2, c[6 + i])));
+    j.point[1][i] = fma(b, c[i], fma(e, c[3 + i], hn::Mul(e2, c[6 + i])));
+  }
+  return j;
+}
+
+/// 1 in lanes below `lanes`, 0 beyond, for the part that starts at lane `first`.
+HWY_INLINE V lane_mask(std::uint32_t lanes, int first) {
+  alignas(64) double ones[8];
+  for (int l = 0; l < kLanes; ++l)
+    ones[l] = static_cast<std::uint32_t>(first + l) < lanes ? 1.0 : 0.0;
+  return load(ones);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

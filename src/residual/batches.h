@@ -1,0 +1,38 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "platform/buffer.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// Observations arranged for eight lanes. Points are sorted by track length and then by the images
+/// that see them; a group is eight points of one track length; a batch is one observation of each
+/// of its eight points. So sums over a point's track need no scatter, and most batches see one
+/// image in all lanes.
+struct Batches {
+  struct Group {
+    std::uint64_t first_batch;  ///< its `track` batches follow each other
+    std::uint32_t track;        ///< observations of each of its points
+    std::uint32_t lanes;        ///< points in it; lanes beyond repeat the first and are masked
+  };
+  std::vector<Group> groups;
+  std::vector<std::uint32_t> lane_point;  ///< 8 per group: point index in the problem
+  Buffer<std::uint32_t> image;            ///< 8 per batch: image index
+  Buffer<std::int32_t> uniform;           ///< per batch: the image all lanes share, or -1
+  Buffer<double> xy;                      ///< 16 per batch: x of the lanes, then y, pixels
+  std::uint32_t longest_track = 0;
+  std::uint64_t observations = 0;
+
+  std::uint64_t num_batches() const { return uniform.size(); }
+};
+
+/// Arranges the observations of a valid problem; those with skip[i] != 0 are left out (skip may be
+/// empty). Points that nobody sees are in no group.
+Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip = {});
+
+}  // namespace sheaf

@@ -1,0 +1,132 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sheaf/solve.h"
+
+#include <cmath>
+#include <string>
+
+#include "linear/bundle_system.h"
+#include "linear/kernel_table.h"
+#include "platform/clock.h"
+#include "platform/memory.h"
+#include "solve/trust_region.h"
+
+namespace sheaf {
+namespace {
+
+const char* simd_name(Simd simd) {
+  switch (simd) {
+    case Simd::scalar: return "scalar";
+    case Simd::sse4: return "sse4";
+    case Simd::avx2: return "avx2";
+    case Simd::avx512: return "avx512";
+    case Simd::best: break;
+  }
+  return "";
+}
+
+Result<const Kernels*> choose_kernels(Simd simd) {
+  const auto available = available_kernels();
+  if (simd == Simd::best) return available.front();
+  std::string names;
+  for (const Kernels* kernels : available) {
+    if (std::string(kernels->name) == simd_name(simd)) return kernels;
+    names += std::string(names.empty() ? "" : ", ") + kernels->name;
+  }
+  return Error(ErrorCode::usage, std::string("this machine cannot run the instruction set ") +
+                                     simd_name(simd) + "; it can run: " + names);
+}
+
+Result<void> check(const Problem& problem, const SolveOptions& options) {
+  if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+  const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
+  for (std::uint32_t i : options.fixed.pose_ids)
+    if (i >= problem.num_images())
+      return usage("fixed pose " + std::to_string(i) + " is not one of the " +
+                   std::to_string(problem.num_images()) + " images");
+  for (std::uint32_t i : options.fixed.camera_ids)
+    if (i >= problem.cameras.size())
+      return usage("fixed camera " + std::to_string(i) + " is not one of the " +
+                   std::to_string(problem.cameras.size()) + " cameras");
+  if (problem.num_observations() == 0) return usage("the problem has no observations");
+  if (options.max_iterations < 0) return usage("max_iterations is negative");
+  if (!(options.tolerance >= 0)) return usage("tolerance is negative or not a number");
+  if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
+  if (options.threads < 0) return usage("threads is negative");
+  return {};
+}
+
+void describe(const Problem& problem, const BundleSystem& system, const Kernels& kernels,
+              int threads, Summary& summary) {
+  const std::string images = std::to_string(problem.num_images());
+  if (system.couples_images()) {
+    summary.solver = "dense";
+    summary.solver_reason = "the reduced camera matrix of " + images +
+                            " images is formed explicitly and factored by dense Cholesky";
+  } else {
+    summary.solver = "blocks";
+    summary.solver_reason =
+        "no free point couples the images: one small system for each of the " + images;
+  }
+  summary.simd = kernels.name;
+  summary.threads = threads;
+  summary.forecast_bytes = resident_bytes() + system.bytes();
+}
+
+double rms(double cost, std::size_t observations) {
+  return observations > 0 ? std::sqrt(2 * cost / static_cast<double>(observations)) : 0;
+}
+
+}  // namespace
+
+Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
+  const Stopwatch clock;
+  if (Result<void> valid = check(problem, options); !valid.ok()) return valid.error();
+  Result<const Kernels*> kernels = choose_kernels(options.simd);
+  if (!kernels.ok()) return kernels.error();
+
+  Summary summary;
+  std::vector<std::uint8_t> skip;
+  if (options.cheirality == Cheirality::hold_out) {
+    summary.rejected_observations = evaluate(problem).behind;
+    skip.assign(problem.num_observations(), 0);
+    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
+  }
+  try {
+    Threads threads(options.threads);
+    BundleSystem system(problem, options.fixed, options.cheirality != Cheirality::formula, skip,
+                        *kernels.value(), threads);
+    describe(problem, system, *kernels.value(), threads.count(), summary);
+    if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
+    summary.setup_s = clock.seconds();
+    minimize(system, options, clock, summary);
+    system.store(problem);
+    summary.solve_s = clock.seconds() - summary.setup_s;
+    if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
+  } catch (const std::bad_alloc&) {
+    return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
+  }
+  const std::size_t used = problem.num_observations() - summary.rejected_observations.size();
+  summary.initial_rms_px = rms(summary.initial_cost, used);
+  summary.final_rms_px = rms(summary.final_cost, used);
+  return summary;
+}
+
+Summary solve(Problem& problem, const SolveOptions& options) {
+  return try_solve(problem, options).value();
+}
+
+const char* to_string(Termination termination) {
+  switch (termination) {
+    case Termination::cost_converged: return "cost_converged";
+    case Termination::gradient_converged: return "gradient_converged";
+    case Termination::step_converged: return "step_converged";
+    case Termination::max_iterations: return "max_iterations";
+    case Termination::time_limit: return "time_limit";
+    case Termination::stopped: return "stopped";
+    case Termination::no_usable_step: return "no_usable_step";
+  }
+  return "no_usable_step";
+}
+
+}  // namespace sheaf

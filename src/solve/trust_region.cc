@@ -1,0 +1,193 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solve/trust_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace sheaf {
+namespace {
+
+constexpr double kInitialDamping = 1e-4;
+constexpr double kLargestDamping = 1e32;
+/// A gain below this is a step that did not help.
+constexpr double kSmallestGain = 1e-3;
+/// A step that changes no block by more than this (relative) is rounding.
+constexpr double kRounding = 1e-14;
+
+/// lambda, and how fast it grows while steps are rejected (Nielsen's rule, Madsen et al. 2004).
+struct Damping {
+  double lambda;
+  double growth = 2;
+
+  void shrink(double gain) {
+    lambda *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
+    lambda = std::max(lambda, 1e-16);
+    growth = 2;
+  }
+  void grow() {
+    lambda = std::min(lambda * growth, kLargestDamping);
+    growth *= 2;
+  }
+};
+
+class Loop {
+ public:
+  Loop(System& system, const SolveOptions& options, const Stopwatch& clock, Summary& summary)
+      : system_(system), options_(options), since_start_(clock), summary_(summary) {
+    damping_.lambda = options.initial_damping > 0 ? options.initial_damping : kInitialDamping;
+  }
+
+  void run() {
+    while (!done_) {
+      const Step step = system_.propose(damping_.lambda);
+      if (summary_.iterations.empty()) begin(step);
+      if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
+      if (!step.solved) {
+        reject(record(step, std::nullopt));
+        continue;
+      }
+      const Trial trial = system_.trial();
+      Iteration tried = record(step, trial);
+      if (accepts(trial, tried))
+        accept(trial, tried);
+      else
+        reject(tried);
+    }
+    summary_.final_cost = cost_;
+  }
+
+ private:
+  /// The start: nothing tried yet.
+  void begin(const Step& step) {
+    cost_ = step.cost;
+    summary_.initial_cost = cost_;
+    Iteration start;
+    start.cost = start.trial_cost = cost_;
+    start.damping = damping_.lambda;
+    start.gradient_max = step.gradient_max;
+    if (!std::isfinite(cost_)) {
+      end(Termination::no_usable_step,
+          "the cost of the start is not finite: a point lies in the plane of a camera's centre, or "
+          "the numbers overflow");
+    }
+    publish(start);
+  }
+
+  Iteration record(const Step& step, const std::optional<Trial>& trial) const {
+    Iteration it;
+    it.index = static_cast<int>(summary_.iterations.size());
+    it.cost = cost_;
+    it.trial_cost = trial ? trial->cost : std::numeric_limits<double>::quiet_NaN();
+    it.accepted = false;
+    it.damping = damping_.lambda;
+    it.gradient_max = step.gradient_max;
+    it.linear_iterations = step.linear_iterations;
+    if (trial) {
+      it.gain_ratio = (cost_ - trial->cost) / trial->predicted_decrease;
+      it.step_norm = trial->step_norm;
+    }
+    return it;
+  }
+
+  bool accepts(const Trial& trial, const Iteration& it) const {
+    if (!std::isfinite(trial.cost) || !(trial.predicted_decrease > 0)) return false;
+    if (options_.cheirality != Cheirality::formula && trial.newly_behind > 0) return false;
+    return trial.cost < cost_ && it.gain_ratio > kSmallestGain;
+  }
+
+  void accept(const Trial& trial, Iteration it) {
+    system_.accept();
+    const double decrease = (cost_ - trial.cost) / cost_;
+    cost_ = it.cost = trial.cost;
+    it.accepted = true;
+    damping_.shrink(it.gain_ratio);
+    small_decreases_ = decrease < options_.tolerance ? small_decreases_ + 1 : 0;
+    publish(it);
+    if (small_decreases_ >= 2)
+      end(Termination::cost_converged,
+          "converged: the cost fell by less than the tolerance, relatively, twice in a row");
+  }
+
+  void reject(const Iteration& it) {
+    const bool finite = std::isfinite(it.trial_cost);
+    any_finite_trial_ = any_finite_trial_ || finite;
+    damping_.grow();
+    publish(it);
+    const bool exhausted = damping_.lambda >= kLargestDamping;
+    if (exhausted && !any_finite_trial_ && !moved())
+      return end(Termination::no_usable_step,
+                 "no step led to a finite cost, however strong the damping");
+    // Below the cost's own rounding a decrease cannot be seen.
+    const double predicted = std::abs((cost_ - it.trial_cost) / it.gain_ratio);
+    const bool invisible = finite && predicted < 4 * std::numeric_limits<double>::epsilon() * cost_;
+    if (invisible || (finite && it.step_norm < kRounding) || exhausted)
+      end(Termination::step_converged,
+          "converged: no step changes the cost by more than its rounding");
+  }
+
+  bool gradient_vanished(const Step& step) {
+    // |J_i^T r| / |J_i| is at most |r|: the ratio is the cosine between residual and column.
+    if (!(step.gradient_max <= options_.gradient_tolerance * std::sqrt(2 * cost_))) return false;
+    end(Termination::gradient_converged,
+        "converged: the scaled gradient is below its tolerance");
+    return true;
+  }
+
+  bool out_of_iterations() {
+    if (static_cast<int>(summary_.iterations.size()) <= options_.max_iterations) return false;
+    end(Termination::max_iterations,
+        "stopped after " + std::to_string(options_.max_iterations) + " iterations, as asked");
+    return true;
+  }
+
+  bool out_of_time() {
+    if (options_.stop.stop_requested())
+      end(Termination::stopped, "interrupted; the best state so far is kept");
+    else if (since_start_.seconds() >= options_.time_limit_s)
+      end(Termination::time_limit, "the time limit was reached; the best state so far is kept");
+    return done_;
+  }
+
+  bool moved() const {
+    return std::any_of(summary_.iterations.begin(), summary_.iterations.end(),
+                       [](const Iteration& it) { return it.index > 0 && it.accepted; });
+  }
+
+  void publish(Iteration it) {
+    it.time_s = since_begin_.seconds();
+    summary_.iterations.push_back(it);
+    if (options_.on_iteration && !options_.on_iteration(it))
+      end(Termination::stopped, "stopped by the caller; the best state so far is kept");
+  }
+
+  void end(Termination termination, const std::string& words) {
+    if (done_) return;
+    done_ = true;
+    summary_.termination = termination;
+    summary_.words = words;
+  }
+
+  System& system_;
+  const SolveOptions& options_;
+  const Stopwatch& since_start_;
+  const Stopwatch since_begin_;
+  Summary& summary_;
+  Damping damping_;
+  double cost_ = 0;
+  int small_decreases_ = 0;
+  bool any_finite_trial_ = false;
+  bool done_ = false;
+};
+
+}  // namespace
+
+void minimize(System& system, const SolveOptions& options, const Stopwatch& since_start,
+              Summary& summary) {
+  Loop(system, options, since_start, summary).run();
+}
+
+}  // namespace sheaf
