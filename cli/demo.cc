@@ -1,0 +1,146 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "exit_code.h"
+#include "interrupt.h"
+#include "json_document.h"
+#include "outputs.h"
+#include "progress.h"
+#include "report/errors.h"
+#include "scene_arguments.h"
+#include "sheaf/sheaf.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  SceneOptions scene;
+  std::string ply;
+};
+
+// What noise of this size leaves at the optimum: each of the n = 2 x observations components has
+// the variance sigma^2, and the fitted parameters take their share.
+double expected_rms_px(const Problem& problem, double sigma) {
+  const double n = 2.0 * static_cast<double>(problem.num_observations());
+  const double parameters = 6.0 * static_cast<double>(problem.num_images()) +
+                            3.0 * static_cast<double>(problem.cameras.size()) +
+                            3.0 * static_cast<double>(problem.num_points()) - 7;
+  return sigma * std::sqrt(std::max(0.0, 2 * (1 - parameters / n)));
+}
+
+void tell_beginning(const SceneOptions& scene, const Problem& problem) {
+  fmt::print("A synthetic scene: {} (seed {}).\n", counts_text(problem), scene.seed);
+  fmt::print(
+      "The pixels carry {} px of noise; the start is off by {} rad in rotations, {} in\n"
+      "camera centres, {} in points (cameras stand about 1 apart) and {} % in focals.\n\n",
+      scene.pixel_noise_px, scene.rotation_noise_rad, scene.center_noise, scene.point_noise,
+      100 * scene.focal_noise);
+}
+
+void tell_end(const SceneOptions& scene, const Problem& problem, const Summary& summary,
+              const StateErrors& before, const StateErrors& after) {
+  const auto line = [](const char* what, double a, double b) {
+    fmt::print("{:<28} {:>12.6g} {:>12.6g}\n", what, a, b);
+  };
+  fmt::print("\n{:<28} {:>12} {:>12}\n", "median error", "start", "solved");
+  line("rotations (rad)", before.rotation_error_rad.median, after.rotation_error_rad.median);
+  line("camera centres", before.center_error.median, after.center_error.median);
+  line("points", before.point_error.median, after.point_error.median);
+  fmt::print("\nThe residual should come down to the noise: {:.4g} px expected, {:.4g} px found.\n",
+             expected_rms_px(problem, scene.pixel_noise_px), summary.final_rms_px);
+}
+
+Json error_json(const ErrorStatistics& e) {
+  return {{"mean", number(e.mean)},
+          {"median", number(e.median)},
+          {"rms", number(e.rms)},
+          {"max", number(e.max)}};
+}
+
+Json errors_json(const StateErrors& errors) {
+  return {{"aligned", errors.aligned},
+          {"scale", number(errors.scale)},
+          {"rotation_error_rad", error_json(errors.rotation_error_rad)},
+          {"translation_error", error_json(errors.translation_error)},
+          {"center_error", error_json(errors.center_error)},
+          {"point_error", error_json(errors.point_error)}};
+}
+
+Json generated_input(const Problem& problem) {
+  Json input = {{"path", nullptr},
+                {"format", "generated"},
+                {"compression", "none"},
+                {"bytes", 0},
+                {"sha256", nullptr}};
+  input.update(counts_json(problem));
+  return input;
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const std::string& json = arguments.common.json;
+  check_outputs({{"--ply", arguments.ply}, {"--json", json}});
+  const Scene scene = generate(arguments.scene).value();
+  const double generate_s = total.seconds();
+  tell_beginning(arguments.scene, scene.start);
+  std::fflush(stdout);  // the progress on stderr comes next
+
+  Problem problem = scene.start;
+  Progress progress(arguments.common.quiet);
+  SolveOptions options;
+  options.threads = arguments.common.threads;
+  options.stop = interrupt.token();
+  options.on_iteration = [&](const Iteration& iteration) {
+    progress.report(iteration);
+    return true;
+  };
+  interrupt.begin_solve();
+  const Summary summary = try_solve(problem, options).value();
+  interrupt.begin_write();
+
+  const StateErrors before = compare_states(scene.start, scene.truth, true).value();
+  const StateErrors after = compare_states(problem, scene.truth, true).value();
+  fmt::print("{}", summary_text(summary, 0));
+  tell_end(arguments.scene, problem, summary, before, after);
+  const Timer writing;
+  if (!arguments.ply.empty()) write_ply(scene.start, problem, arguments.ply).value();
+  if (!json.empty()) {
+    SolveRecord record{.input = generated_input(problem),
+                       .arguments = SolveArguments(),
+                       .before = evaluate(scene.start),
+                       .after = evaluate(problem),
+                       .read_s = generate_s,
+                       .write_s = writing.seconds(),
+                       .total_s = total.seconds()};
+    Json document = solve_json(record, summary, problem);
+    document["scene"] = scene_options_json(arguments.scene);
+    document["errors"] = {{"before", errors_json(before)}, {"after", errors_json(after)}};
+    write_json(document, json);
+  }
+  return exit_code_of(summary.termination);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb = *app.add_subcommand("demo", "make a scene, disturb it, solve it, look at it");
+  add_scene_options(verb, arguments->scene);
+  verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
+      ->type_name("FILE");
+  add_common_options(verb, arguments->common);
+  verb.footer("Example:\n  sheaf demo --cameras 30 --points 2000 --ply demo.ply");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

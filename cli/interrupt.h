@@ -1,0 +1,38 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <stop_token>
+#include <thread>
+
+namespace sheaf {
+
+/// What Ctrl-C (SIGINT) and SIGTERM do. Until `begin_solve` they end the command at once: there is
+/// nothing to save. From then on the first one asks the solver to stop, so that its best state can
+/// be written, and a second one ends the command at once. From `begin_write` on they wait.
+///
+/// Construct it before any thread is started: the signals are blocked in the constructing thread
+/// and all that it starts later, and one thread waits for them.
+class Interrupt {
+ public:
+  explicit Interrupt(bool quiet);
+  ~Interrupt();
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  void begin_solve() { phase_ = Phase::solve; }
+  void begin_write() { phase_ = Phase::write; }
+  std::stop_token token() const { return stop_.get_token(); }
+
+ private:
+  enum class Phase { read, solve, write, over };
+  void watch();
+
+  std::stop_source stop_;
+  std::atomic<Phase> phase_{Phase::read};
+  bool quiet_;
+  std::thread watcher_;
+};
+
+}  // namespace sheaf

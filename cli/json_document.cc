@@ -1,0 +1,149 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "json_document.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "inspect/statistics.h"
+#include "io/output_file.h"
+
+namespace sheaf {
+namespace {
+
+constexpr std::size_t kMostListed = 1000;
+
+Json iteration_json(const Iteration& it) {
+  return {{"index", it.index},
+          {"cost", number(it.cost)},
+          {"trial_cost", it.index == 0 ? Json() : number(it.trial_cost)},
+          {"accepted", it.accepted},
+          {"damping", number(it.damping)},
+          {"gain_ratio", number(it.gain_ratio)},
+          {"gradient_max", number(it.gradient_max)},
+          {"step_norm", number(it.step_norm)},
+          {"linear_iterations", it.linear_iterations},
+          {"time_s", number(it.time_s)}};
+}
+
+Json options_json(const SolveArguments& a) {
+  Json fix = Json::array();
+  for (std::size_t begin = 0; begin < a.fix.size();) {
+    const std::size_t end = std::min(a.fix.find(',', begin), a.fix.size());
+    fix.push_back(a.fix.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return {{"max_iterations", a.max_iterations},
+          {"tolerance", a.tolerance},
+          {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
+          {"cheirality", a.cheirality},
+          {"fix", fix},
+          {"solver", a.solver},
+          {"initial_damping", a.initial_damping},
+          {"simd", a.simd}};
+}
+
+Json range_json(const Range& range) {
+  return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
+}
+
+}  // namespace
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json counts_json(const Problem& problem) {
+  return {{"cameras", problem.cameras.size()},
+          {"poses", problem.num_images()},
+          {"points", problem.num_points()},
+          {"observations", problem.num_observations()}};
+}
+
+Json input_json(const std::string& path, const InputFile& input) {
+  Json out = {{"path", path},
+              {"format", input.format},
+              {"compression", input.compression},
+              {"bytes", input.bytes},
+              {"sha256", input.sha256}};
+  out.update(counts_json(input.problem));
+  return out;
+}
+
+Json observations_json(const std::vector<std::uint64_t>& ids, const Problem& problem) {
+  Json list = Json::array();
+  for (std::size_t k = 0; k < std::min(ids.size(), kMostListed); ++k)
+    list.push_back({{"observation", ids[k]},
+                    {"image", problem.observation_image[ids[k]]},
+                    {"point", problem.observation_point[ids[k]]}});
+  return {{"count", ids.size()}, {"first", list}};
+}
+
+Json statistics_json(const Statistics& statistics) {
+  Json histogram = Json::array();
+  for (const auto& [length, points] : statistics.track_histogram)
+    histogram.push_back({{"length", length}, {"points", points}});
+  Json track = range_json(statistics.track);
+  track["mean"] = number(statistics.mean_track);
+  track["histogram"] = histogram;
+  return {{"track", track},
+          {"observations_per_image", range_json(statistics.observations_per_image)},
+          {"focal_px", range_json(statistics.focal_px)}};
+}
+
+Json scene_options_json(const SceneOptions& o) {
+  return {{"cameras", o.images},
+          {"points", o.points},
+          {"mean_track", o.mean_track},
+          {"pixel_noise_px", o.pixel_noise_px},
+          {"rotation_noise_rad", o.rotation_noise_rad},
+          {"center_noise", o.center_noise},
+          {"point_noise", o.point_noise},
+          {"focal_noise", o.focal_noise},
+          {"seed", o.seed}};
+}
+
+Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
+  Json iterations = Json::array();
+  for (const Iteration& it : s.iterations) iterations.push_back(iteration_json(it));
+  return {{"version", SHEAF_VERSION},
+          {"input", record.input},
+          {"options", options_json(record.arguments)},
+          {"solver", {{"name", s.solver}, {"reason", s.solver_reason}}},
+          {"precision", s.precision},
+          {"simd", s.simd},
+          {"threads", s.threads},
+          {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_bytes()}}},
+          {"initial_cost", number(s.initial_cost)},
+          {"final_cost", number(s.final_cost)},
+          {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
+          {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
+          {"iterations", iterations},
+          {"time",
+           {{"read_s", record.read_s},
+            {"setup_s", s.setup_s},
+            {"solve_s", s.solve_s},
+            {"write_s", record.write_s},
+            {"total_s", record.total_s}}},
+          {"plain_cost",
+           {{"before", number(record.before.cost)}, {"after", number(record.after.cost)}}},
+          {"behind_camera",
+           {{"before", observations_json(s.behind_camera_before, problem)},
+            {"after", observations_json(s.behind_camera_after, problem)}}},
+          {"rejected_observations", observations_json(s.rejected_observations, problem)}};
+}
+
+std::uint64_t peak_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+void write_json(const Json& document, const std::string& path) {
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(document.dump(1) + "\n");
+  file.value().commit().value();
+}
+
+}  // namespace sheaf

@@ -1,0 +1,31 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "outputs.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "sheaf/error.h"
+#include "sheaf/io.h"
+
+namespace sheaf {
+
+void check_outputs(const std::vector<NamedOutput>& outputs) {
+  const auto normal = [](const std::string& path) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(path, ignored);
+  };
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].path.empty()) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!outputs[j].path.empty() && normal(outputs[i].path) == normal(outputs[j].path))
+        throw Error(ErrorCode::usage,
+                    fmt::format("{} and {} name the same file, {}", outputs[j].option,
+                                outputs[i].option, outputs[i].path));
+    }
+    check_writable(outputs[i].path).value();
+  }
+}
+
+}  // namespace sheaf

@@ -1,0 +1,44 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace sheaf {
+
+Progress::Progress(bool quiet)
+    : style_(quiet                   ? Style::none
+             : isatty(STDERR_FILENO) ? Style::table
+                                     : Style::lines) {}
+
+void Progress::report(const Iteration& it) {
+  const double change = it.index == 0 ? 0 : it.trial_cost - cost_;
+  cost_ = it.cost;
+  if (style_ == Style::table) {
+    if (it.index == 0)
+      fmt::print(stderr, "{:>5} {:>16} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "iter", "cost", "change",
+                 "gain", "damping", "gradient", "time (s)");
+    if (it.index == 0)
+      fmt::print(stderr, "{:>5} {:>16.9e} {:>11} {:>8} {:>9} {:>9.2e} {:>9.3f}\n", 0, it.cost, "",
+                 "", "", it.gradient_max, it.time_s);
+    else
+      fmt::print(stderr, "{:>5} {:>16.9e} {:>11.3e} {:>8.3f} {:>9.2e} {:>9.2e} {:>9.3f}{}\n",
+                 it.index, it.cost, change, it.gain_ratio, it.damping, it.gradient_max, it.time_s,
+                 it.accepted ? "" : "  rejected");
+    std::fflush(stderr);
+  } else if (style_ == Style::lines) {
+    if (it.index == 0)
+      fmt::print(stderr, "start: cost {:.9e}\n", it.cost);
+    else
+      fmt::print(stderr,
+                 "iteration {}: cost {:.9e}, change {:.3e}{}, gain {:.3f}, damping {:.2e}, "
+                 "gradient {:.2e}, {:.3f} s\n",
+                 it.index, it.cost, change, it.accepted ? "" : " (rejected)", it.gain_ratio,
+                 it.damping, it.gradient_max, it.time_s);
+  }
+}
+
+}  // namespace sheaf

@@ -1,0 +1,21 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "sheaf/summary.h"
+
+namespace sheaf {
+
+/// Reports iterations on stderr: a table in a terminal, self-contained lines elsewhere.
+class Progress {
+ public:
+  explicit Progress(bool quiet);
+  void report(const Iteration& iteration);
+
+ private:
+  enum class Style { none, table, lines };
+  Style style_;
+  double cost_ = 0;
+};
+
+}  // namespace sheaf

@@ -1,0 +1,113 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "exit_code.h"
+#include "interrupt.h"
+#include "json_document.h"
+#include "outputs.h"
+#include "progress.h"
+#include "sheaf/sheaf.h"
+#include "solve_arguments.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  SolveArguments solve;
+  std::string in, out, ply;
+};
+
+// The best state found; what could not be improved is not written again.
+std::vector<std::string> write_results(const Arguments& arguments, const Problem& before,
+                                       const Problem& after) {
+  std::vector<std::string> written;
+  if (!arguments.out.empty()) {
+    write(after, arguments.out).value();
+    written.push_back(arguments.out);
+  }
+  if (!arguments.ply.empty()) {
+    write_ply(before, after, arguments.ply).value();
+    written.push_back(arguments.ply);
+  }
+  return written;
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const bool wants_json = !arguments.common.json.empty();
+  check_outputs(
+      {{"-o", arguments.out}, {"--json", arguments.common.json}, {"--ply", arguments.ply}});
+  InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
+  Problem& problem = input.problem;
+
+  SolveRecord record;
+  record.arguments = arguments.solve;
+  record.read_s = input.read_s;
+  if (wants_json) {
+    record.input = input_json(arguments.in, input);
+    record.before = evaluate(problem);
+  }
+  Problem before;
+  if (!arguments.ply.empty()) before = problem;
+
+  Progress progress(arguments.common.quiet);
+  SolveOptions options = solve_options(arguments.solve);
+  options.threads = arguments.common.threads;
+  options.stop = interrupt.token();
+  options.on_iteration = [&](const Iteration& iteration) {
+    progress.report(iteration);
+    return true;
+  };
+  interrupt.begin_solve();
+  const Summary summary = try_solve(problem, options).value();
+  interrupt.begin_write();
+
+  const Timer writing;
+  std::vector<std::string> written;
+  if (summary.usable()) written = write_results(arguments, before, problem);
+  record.write_s = writing.seconds();
+  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
+  fmt::print("{}", summary_text(summary, input.read_s));
+  if (wants_json) {
+    record.after = evaluate(problem);
+    record.total_s = total.seconds();
+    write_json(solve_json(record, summary, problem), arguments.common.json);
+    written.push_back(arguments.common.json);
+  }
+  if (!written.empty()) fmt::print("wrote       {}\n", fmt::join(written, ", "));
+  return exit_code_of(summary.termination);
+}
+
+}  // namespace
+
+void add_solve(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb = *app.add_subcommand("solve", "refine camera poses, intrinsics and points");
+  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
+      ->type_name("FILE")
+      ->required();
+  verb.add_option(
+          "-o,--output", arguments->out,
+          "write the refined problem; NAME.ply is a point cloud with cameras, anything else "
+          "BAL, NAME.gz and NAME.bz2 compressed")
+      ->type_name("OUT");
+  verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
+      ->type_name("FILE");
+  add_solve_options(verb, arguments->solve);
+  add_common_options(verb, arguments->common);
+  verb.footer("Example:\n  sheaf solve problem.txt -o refined.txt --json summary.json");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

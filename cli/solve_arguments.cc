@@ -1,0 +1,136 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solve_arguments.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string_view>
+#include <vector>
+
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+const std::map<std::string, Cheirality> kCheiralities = {{"formula", Cheirality::formula},
+                                                         {"reject", Cheirality::reject},
+                                                         {"hold-out", Cheirality::hold_out}};
+const std::map<std::string, CameraSolverKind> kSolvers = {{"auto", CameraSolverKind::automatic},
+                                                          {"dense", CameraSolverKind::dense}};
+const std::map<std::string, Simd> kSimds = {{"best", Simd::best},
+                                            {"scalar", Simd::scalar},
+                                            {"sse4", Simd::sse4},
+                                            {"avx2", Simd::avx2},
+                                            {"avx512", Simd::avx512}};
+
+bool parse_index(std::string_view text, std::uint32_t& out) {
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, out);
+  return error == std::errc() && stop == end;
+}
+
+bool parse_fix_item(std::string_view item, Fixed& out) {
+  std::uint32_t index = 0;
+  if (item == "points") return out.points = true;
+  if (item == "poses") return out.poses = true;
+  if (item == "intrinsics") return out.f = out.k1 = out.k2 = true;
+  if (item == "f") return out.f = true;
+  if (item == "k1") return out.k1 = true;
+  if (item == "k2") return out.k2 = true;
+  if (item.substr(0, 5) == "pose=" && parse_index(item.substr(5), index)) {
+    out.pose_ids.push_back(index);
+    return true;
+  }
+  if (item.substr(0, 7) == "camera=" && parse_index(item.substr(7), index)) {
+    out.camera_ids.push_back(index);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string parse_fix(const std::string& list, Fixed& out) {
+  std::string_view rest = list;
+  while (true) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view item = rest.substr(0, comma);
+    if (!parse_fix_item(item, out))
+      return fmt::format(
+          "expected a comma-separated list of points, poses, intrinsics, f, k1, k2, pose=K, "
+          "camera=K (K from 0 up), not '{}'",
+          item);
+    if (comma == std::string_view::npos) return "";
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+void add_solve_options(CLI::App& verb, SolveArguments& a) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const double most = std::numeric_limits<double>::max();
+  verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
+      ->type_name("N")
+      ->check(whole_number_from(0, "a whole number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--tolerance", a.tolerance,
+                  "stop when the relative decrease of the cost stays below this twice")
+      ->type_name("T")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--time-limit", a.time_limit_s,
+                  "stop after this many seconds of set-up and solving, write the best state and "
+                  "exit with 130")
+      ->type_name("SECONDS")
+      ->check(number_in(0, inf, false, "a number of seconds above 0"));
+  verb.add_option(
+          "--cheirality", a.cheirality,
+          "observations behind their camera: formula (count them as the model does), reject "
+          "(refuse steps that add some), hold-out (leave those at the start out, then as "
+          "reject)")
+      ->type_name("RULE")
+      ->check(one_of({"formula", "reject", "hold-out"}))
+      ->capture_default_str();
+  verb.add_option(
+          "--fix", a.fix,
+          "hold these to the last bit: a comma-separated list of points, poses, intrinsics, "
+          "f, k1, k2, pose=K, camera=K")
+      ->type_name("LIST")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Fixed ignored;
+            return parse_fix(text, ignored);
+          },
+          ""));
+  verb.add_option("--solver", a.solver, "how the camera system is solved: auto, dense")
+      ->type_name("NAME")
+      ->check(one_of({"auto", "dense"}))
+      ->capture_default_str();
+  verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
+      ->type_name("LAMBDA")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--simd", a.simd,
+                  "instruction set: best, scalar, sse4, avx2, avx512 (for tests and measurements)")
+      ->type_name("NAME")
+      ->check(one_of({"best", "scalar", "sse4", "avx2", "avx512"}))
+      ->capture_default_str();
+}
+
+SolveOptions solve_options(const SolveArguments& a) {
+  SolveOptions options;
+  options.max_iterations = a.max_iterations;
+  options.tolerance = a.tolerance;
+  if (a.time_limit_s > 0) options.time_limit_s = a.time_limit_s;
+  options.cheirality = kCheiralities.at(a.cheirality);
+  if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
+  options.solver = kSolvers.at(a.solver);
+  options.initial_damping = a.initial_damping;
+  options.simd = kSimds.at(a.simd);
+  return options;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,32 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "sheaf/options.h"
+
+namespace sheaf {
+
+/// The options of a solve as the command line states them.
+struct SolveArguments {
+  int max_iterations = SolveOptions().max_iterations;
+  double tolerance = SolveOptions().tolerance;
+  double time_limit_s = 0;  ///< 0: none
+  std::string cheirality = "formula";
+  std::string fix;
+  std::string solver = "auto";
+  double initial_damping = 0;
+  std::string simd = "best";
+};
+
+void add_solve_options(CLI::App& verb, SolveArguments& arguments);
+
+/// Everything but threads and callbacks. The arguments have passed their validators.
+SolveOptions solve_options(const SolveArguments& arguments);
+
+/// "" or what is wrong with a --fix list.
+std::string parse_fix(const std::string& list, Fixed& out);
+
+}  // namespace sheaf

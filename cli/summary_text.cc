@@ -1,0 +1,41 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "summary_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace sheaf {
+
+std::string counts_text(const Problem& problem) {
+  std::string images = fmt::format("{} images", problem.num_images());
+  if (problem.cameras.size() != problem.num_images())
+    images += fmt::format(" ({} cameras)", problem.cameras.size());
+  return fmt::format("{}, {} points, {} observations", images, problem.num_points(),
+                     problem.num_observations());
+}
+
+std::string summary_text(const Summary& s, double read_s) {
+  const auto steps = s.iterations.empty() ? 0 : s.iterations.size() - 1;
+  const auto rejected = std::count_if(s.iterations.begin(), s.iterations.end(),
+                                      [](const Iteration& it) { return !it.accepted; });
+  std::string out;
+  out += fmt::format("cost        {:.9e} -> {:.9e}\n", s.initial_cost, s.final_cost);
+  out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
+  out += fmt::format("iterations  {}{}\n", steps,
+                     rejected > 0 ? fmt::format(" ({} rejected)", rejected) : "");
+  out += fmt::format("stopped     {}\n", s.words);
+  out += fmt::format("time        read {:.3f} s, set-up {:.3f} s, solve {:.3f} s\n", read_s,
+                     s.setup_s, s.solve_s);
+  out += fmt::format("solver      {} ({}); {}, {}, {} thread{}\n", s.solver, s.solver_reason,
+                     s.precision, s.simd, s.threads, s.threads == 1 ? "" : "s");
+  if (!s.behind_camera_before.empty() || !s.behind_camera_after.empty())
+    out += fmt::format("behind      {} -> {} observations behind their camera\n",
+                       s.behind_camera_before.size(), s.behind_camera_after.size());
+  if (!s.rejected_observations.empty())
+    out += fmt::format("left out    {} observations\n", s.rejected_observations.size());
+  return out;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,30 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace sheaf {
+
+/// What every verb takes.
+struct CommonOptions {
+  std::string json;    ///< file for the result as JSON, or empty
+  int threads = 0;     ///< 0: all
+  bool quiet = false;  ///< nothing on stderr but errors
+};
+void add_common_options(CLI::App& verb, CommonOptions& options);
+
+/// Each adds its verb. A verb that ran leaves its exit code; errors are thrown as sheaf::Error.
+void add_solve(CLI::App& app, int& exit_code);
+void add_info(CLI::App& app, int& exit_code);
+void add_convert(CLI::App& app, int& exit_code);
+void add_generate(CLI::App& app, int& exit_code);
+void add_demo(CLI::App& app, int& exit_code);
+
+/// A validator that names what is accepted: "expected WHAT, not 'TEXT'".
+CLI::Validator whole_number_from(long long lowest, const std::string& what);
+CLI::Validator number_in(double lowest, double highest, bool lowest_too, const std::string& what);
+CLI::Validator one_of(const std::vector<std::string>& names);
+
+}  // namespace sheaf

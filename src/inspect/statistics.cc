@@ -1,0 +1,55 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inspect/statistics.h"
+
+#include <algorithm>
+#include <map>
+
+namespace sheaf {
+namespace {
+
+std::vector<double> occurrences(const std::vector<std::uint32_t>& ids, std::size_t size) {
+  std::vector<double> counts(size, 0);
+  for (const std::uint32_t id : ids) ++counts[id];
+  return counts;
+}
+
+template <class T>
+std::uint64_t bytes_of(const std::vector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
+}  // namespace
+
+Range range_of(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return {values.front(), (values[(n - 1) / 2] + values[n / 2]) / 2, values.back()};
+}
+
+Statistics statistics_of(const Problem& problem) {
+  Statistics out;
+  const std::vector<double> tracks = occurrences(problem.observation_point, problem.num_points());
+  std::map<std::uint64_t, std::uint64_t> histogram;
+  for (const double length : tracks) ++histogram[static_cast<std::uint64_t>(length)];
+  out.track_histogram.assign(histogram.begin(), histogram.end());
+  out.track = range_of(tracks);
+  if (problem.num_points() > 0)
+    out.mean_track =
+        static_cast<double>(problem.num_observations()) / static_cast<double>(problem.num_points());
+  out.observations_per_image =
+      range_of(occurrences(problem.observation_image, problem.num_images()));
+  std::vector<double> focal;
+  for (const Camera& camera : problem.cameras) focal.push_back(camera.parameters[0]);
+  out.focal_px = range_of(std::move(focal));
+  return out;
+}
+
+std::uint64_t size_bytes(const Problem& p) {
+  return bytes_of(p.poses) + bytes_of(p.image_camera) + bytes_of(p.cameras) + bytes_of(p.points) +
+         bytes_of(p.observation_image) + bytes_of(p.observation_point) +
+         bytes_of(p.observation_xy) + bytes_of(p.bal_angle_axis);
+}
+
+}  // namespace sheaf

@@ -1,0 +1,33 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// The median of an even number of values is the mean of the middle two. All 0 for no values.
+struct Range {
+  double min = 0, median = 0, max = 0;
+};
+Range range_of(std::vector<double> values);
+
+/// What is in a problem. Tracks are the observations of one point.
+struct Statistics {
+  /// (length, points with that length), ascending, without empty entries.
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> track_histogram;
+  Range track;
+  double mean_track = 0;
+  Range observations_per_image;
+  Range focal_px;
+};
+Statistics statistics_of(const Problem& problem);
+
+/// Bytes that the problem's arrays hold.
+std::uint64_t size_bytes(const Problem& problem);
+
+}  // namespace sheaf
