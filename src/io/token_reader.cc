@@ -105,6 +105,7 @@ bool TokenReader::read_real_slowly(double& value) {
 bool TokenReader::at_end() {
   token_ = p_ = skip_space(p_);
   while (p_ == end_ && slide()) token_ = p_ = skip_space(p_);
+  if (p_ != end_) slide();  // so that the message shows the whole token
   return p_ == end_ && source_ended_ && !source_error_;
 }
 
