@@ -17,6 +17,10 @@ sha256=e128b6b076399db26007a92323d98fe7b48db2a31089240273f40f582e612a91
 name=problem-16-22106-pre.txt
 page=https://grail.cs.washington.edu/projects/bal/data/dubrovnik/$name.bz2
 
+if ! command -v python3 >/dev/null; then
+  echo "get-data: python3 is missing: scripts/install-deps.sh installs it"
+  exit 1
+fi
 say() { echo "get-data: $*"; }
 is_right() { [ -f "$1" ] && [ "$(sha256sum <"$1" | cut -d' ' -f1)" = "$sha256" ]; }
 
@@ -66,10 +70,17 @@ from_source_package() {
     timeout 180 "${apt[@]}" update || true  # one dead source among several does not matter
     timeout 180 "${apt[@]}" source --download-only ceres-solver
   ) >"$scratch/apt.log" 2>&1 || return 1
-  local tarball
-  for tarball in "$scratch"/ceres-solver_*.orig.tar.*; do
-    tar -xOf "$tarball" --wildcards "*/data/$name" >"$scratch/found.txt" 2>/dev/null || true
-  done
+  # Python's own reader: a small machine may lack xz.
+  python3 - "$name" "$scratch/found.txt" "$scratch"/ceres-solver_*.orig.tar.* <<'PYTHON' || return 1
+import shutil, sys, tarfile
+name, out, *tarballs = sys.argv[1:]
+for tarball in tarballs:
+    with tarfile.open(tarball) as archive:
+        for member in archive:
+            if member.name.endswith("/data/" + name):
+                with open(out, "wb") as file:
+                    shutil.copyfileobj(archive.extractfile(member), file)
+PYTHON
   is_right "$scratch/found.txt"
 }
 
