@@ -132,7 +132,7 @@ class Watch final : public ceres::IterationCallback {
       : record_(record), arguments_(arguments) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
-    record_.add(step.cost);
+    record_.add(step.cost, step.step_is_successful);
     return record_.over(arguments_) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 

@@ -114,7 +114,12 @@ void RunRecord::start() {
 double RunRecord::now() const { return wall_s() - start_s_ - paused_s_; }
 void RunRecord::pause() { pause_begin_s_ = wall_s(); }
 void RunRecord::resume() { paused_s_ += wall_s() - pause_begin_s_; }
-void RunRecord::add(double cost) { trace_.emplace_back(now(), cost); }
+
+void RunRecord::add(double cost, bool accepted) {
+  if (accepted && !trace_.empty())
+    still_ = trace_.back().second - cost <= 1e-12 * cost ? still_ + 1 : 0;
+  trace_.emplace_back(now(), cost);
+}
 
 void RunRecord::finish() {
   total_s_ = now();
@@ -122,7 +127,8 @@ void RunRecord::finish() {
 }
 
 bool RunRecord::over(const Arguments& a) const {
-  return now() >= a.time_limit_s || (!trace_.empty() && trace_.back().second <= a.cost_target);
+  return still_ >= 2 || now() >= a.time_limit_s ||
+         (!trace_.empty() && trace_.back().second <= a.cost_target);
 }
 
 std::string RunRecord::json(const std::string& solver, const Arguments& a) const {

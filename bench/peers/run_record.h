@@ -47,16 +47,19 @@ class RunRecord {
   double now() const;
   void pause();
   void resume();
-  void add(double cost);  ///< cost of the state held now
-  void finish();          ///< the solver returned
+  void add(double cost, bool accepted = true);  ///< cost of the state held now
+  void finish();                                ///< the solver returned
 
-  bool over(const Arguments& arguments) const;  ///< target reached or time spent
+  /// Target reached, time spent, or two accepted steps with a relative decrease below 1e-12: the
+  /// one stopping rule of all solvers, far below what is compared.
+  bool over(const Arguments& arguments) const;
   std::string json(const std::string& solver, const Arguments& arguments) const;
 
  private:
   std::vector<std::pair<double, double>> trace_;  // time_s, cost
   double start_s_ = 0, paused_s_ = 0, pause_begin_s_ = 0, setup_s_ = 0, total_s_ = 0;
   double cpu_start_s_ = 0, cpu_s_ = 0;
+  int still_ = 0;  // accepted steps in a row that decreased next to nothing
 };
 
 }  // namespace peer

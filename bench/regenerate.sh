@@ -1,0 +1,95 @@
+#!/usr/bin/env bash
+# Copyright (c) 2026, the Sheaf authors.
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# Measures everything on this machine and rewrites BENCHMARKS.md, its plots and the README's table.
+# What it uses, all optional, from the environment:
+#   SHEAF_DATA          folder with bal/*.txt                                     [data]
+#   SHEAF_PROBLEMS      files to run instead, separated by spaces
+#   SHEAF_PEERS         peers installed in places of their own, "name=prefix ..."; they are taken
+#                       to be built for this machine. A Ceres or g2o that CMake finds by itself
+#                       is used as well, as ceres-<version> and g2o.
+#   SHEAF_PEER_FLAGS    flags those in SHEAF_PEERS were built with                [-march=native]
+#   SHEAF_PEER_MODULES  folder with CMake modules that a peer's package asks for
+#   SHEAF_PEER_PYTHON   a Python that has the gtsam package                       [python3]
+#   SHEAF_BENCH_RUNS, SHEAF_BENCH_THREADS                                         [5] [1,2]
+#   SHEAF_SOLVERS       NAME:CONFIG,... instead of the list below
+set -euo pipefail
+
+root=$(cd "$(dirname "$0")/.." && pwd)
+build=$root/build/bench
+peers=$build/peers
+plots=docs/bench
+mkdir -p "$peers"
+
+build_peer() { # NAME SOURCE-OPTION CMAKE-ARGUMENTS...
+  local name=$1 program=$2
+  shift 2
+  cmake -S "$root/bench/peers" -B "$build/adapter-$name" -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_MODULE_PATH="${SHEAF_PEER_MODULES:-}" "$@" > "$build/adapter-$name.log" 2>&1 &&
+    cmake --build "$build/adapter-$name" >> "$build/adapter-$name.log" 2>&1 || {
+      echo "$name: its adapter does not build, see $build/adapter-$name.log" >&2
+      return 0
+    }
+  if [ -x "$build/adapter-$name/$program" ]; then
+    ln -sf "$build/adapter-$name/$program" "$peers/peer-$name"
+  fi
+}
+
+echo "== building" >&2
+cmake -S "$root" -B "$build/sheaf" -DCMAKE_BUILD_TYPE=Release -DSHEAF_BUILD_BENCH=ON \
+  -DSHEAF_BUILD_TESTS=OFF -DSHEAF_BUILD_EXAMPLES=OFF -DSHEAF_PEER_CERES=OFF \
+  -DSHEAF_PEER_G2O=OFF > "$build/sheaf.log"
+cmake --build "$build/sheaf" >> "$build/sheaf.log"
+SHEAF_COMMAND=${SHEAF_COMMAND:-$(find "$build/sheaf" -name sheaf -type f -perm -u+x | head -n 1)}
+export SHEAF_COMMAND
+
+build_peer ceres-system peer-ceres -DSHEAF_PEER_G2O=OFF
+if [ -L "$peers/peer-ceres-system" ]; then # named by its version, 2.1 and not 2.1.0
+  version=$(sed -n 's/^-- Ceres \([0-9]*\.[0-9]*\).*/\1/p' "$build/adapter-ceres-system.log")
+  mv "$peers/peer-ceres-system" "$peers/peer-ceres-$version"
+fi
+build_peer g2o peer-g2o -DSHEAF_PEER_CERES=OFF
+for entry in ${SHEAF_PEERS:-}; do
+  name=${entry%%=*}
+  case $name in
+    ceres*) other=G2O program=peer-ceres ;;
+    g2o*) other=CERES program=peer-g2o ;;
+    *) echo "$name: no adapter of that name" >&2 && continue ;;
+  esac
+  build_peer "$name" $program -DSHEAF_PEER_$other=OFF -DCMAKE_PREFIX_PATH="${entry#*=}" \
+    -DCMAKE_CXX_FLAGS="${SHEAF_PEER_FLAGS--march=native}"
+done
+python=${SHEAF_PEER_PYTHON:-python3}
+if "$python" -c 'import gtsam' 2> /dev/null; then
+  printf '#!/bin/sh\nexec "%s" "%s" "$@"\n' "$(command -v "$python")" \
+    "$root/bench/peers/peer_gtsam.py" > "$peers/peer-gtsam"
+  chmod +x "$peers/peer-gtsam"
+fi
+
+ceres_head="ceres-head:dense_schur-analytic,ceres-head:dense_schur-auto,ceres-head:dense_schur-analytic-lapack,ceres-head:sparse_schur-analytic,ceres-head:iterative_explicit-analytic,ceres-head:iterative_implicit-analytic,ceres-head:iterative_implicit-analytic-jacobi"
+ceres_old="ceres-2.1:dense_schur-auto,ceres-2.1:dense_schur-analytic,ceres-2.1:iterative_explicit-analytic"
+g2o="g2o:eigen-lambda=1e-2,g2o:cholmod-lambda=1e-2,g2o:eigen-lambda=1e-4,g2o:eigen"
+solvers=${SHEAF_SOLVERS:-sheaf:auto,$ceres_head,$ceres_old,$g2o,gtsam:cholesky-metis-ceres}
+data=${SHEAF_DATA:-$root/data}/bal
+problems=${SHEAF_PROBLEMS:-$data/dubrovnik-16-22106-pre.txt $data/trafalgar-21-11315-pre.txt $data/ladybug-49-7776-pre.txt}
+
+echo "== measuring the machine and the kernels" >&2
+machine=$(find "$build/sheaf" -name bench-machine -type f | head -n 1)
+"$machine" --json > "$build/machine.json"
+kernels=()
+kernel_program=$(find "$build/sheaf" -name bench-kernels -type f | head -n 1)
+if [ -n "$kernel_program" ]; then
+  "$kernel_program" --benchmark_out="$build/kernels.json" --benchmark_out_format=json >&2
+  kernels=("$build/kernels.json")
+fi
+
+echo "== running side by side" >&2
+# shellcheck disable=SC2086  # problems are separated by spaces
+python3 "$root/bench/side_by_side.py" --problems $problems --solvers "$solvers" \
+  --peers "$peers" --threads "${SHEAF_BENCH_THREADS:-1,2}" --runs "${SHEAF_BENCH_RUNS:-5}" \
+  --machine "$build/machine.json" --out "$build/results"
+mkdir -p "$root/$plots"
+cp "$build"/results/*.svg "$root/$plots/"
+python3 "$root/bench/write_pages.py" "$build/results/results.json" "$root" "$plots" "${kernels[@]}"
+echo "wrote BENCHMARKS.md, $plots/*.svg and the README's table; runs: $build/results" >&2

@@ -1,0 +1,93 @@
+# Copyright (c) 2026, the Sheaf authors.
+# SPDX-License-Identifier: BSD-3-Clause
+"""From runs to figures: times to f*(1 + tau), medians, Markdown tables."""
+import math
+import statistics
+
+TAUS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
+
+
+def time_to(trace, cost):
+    """Seconds until the cost is at or below `cost`; infinite when it never is."""
+    return next((t for t, c in trace if c <= cost), math.inf)
+
+
+def best_cost(runs):
+    """f*: the best cost found by anyone, as evaluated independently. A solver's own figure does not
+    count: it could be wrong."""
+    finals = [r["final_cost_independent"] for r in runs if not r.get("failed")]
+    return min((c for c in finals if math.isfinite(c)), default=math.nan)
+
+
+def summarise(runs, optimum):
+    """One row per (solver, config), in the order of first appearance: medians over its runs."""
+    groups = {}
+    for run in runs:
+        groups.setdefault((run["name"], run["config"]), []).append(run)
+    return [summary_row(name, config, group, optimum) for (name, config), group in groups.items()]
+
+
+def summary_row(name, config, group, optimum):
+    good = [r for r in group if not r.get("failed")]
+    row = {"name": name, "config": config, "runs": len(good), "failed": len(group) - len(good)}
+    if not good:
+        row["message"] = group[0]["failed"]
+        return row
+    row["solver"] = good[0]["solver"]
+    row["time_to"] = {}
+    for tau in TAUS:
+        times = [time_to(r["trace"], optimum * (1 + tau)) for r in good]
+        row["time_to"][f"{tau:g}"] = finite(statistics.median(times))
+    last = [t for t in (time_to(r["trace"], optimum * (1 + TAUS[-1])) for r in good)
+            if math.isfinite(t)]
+    row["spread"] = (max(last) - min(last)) / statistics.median(last) if last else None
+    for key in ("seconds_per_iteration", "setup_s", "total_s", "cpu_percent", "peak_bytes",
+                "iterations", "final_cost_independent"):
+        row[key] = statistics.median(r[key] for r in good)
+    return row
+
+
+def finite(value):
+    return value if math.isfinite(value) else None
+
+
+def seconds(value):
+    """Three figures that count; a miss is called one."""
+    if value is None:
+        return "miss"
+    if value >= 100:
+        return f"{value:.0f}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}" if value > 0 else "0"
+
+
+def markdown(rows):
+    """The whole table of one problem. Quickest to 1e-3 first, misses last."""
+    head = ["solver", "configuration"] + [f"to {tau:g}" for tau in TAUS]
+    head += ["per iteration", "iterations", "peak MB", "CPU %", "final cost", "spread"]
+    lines = ["| " + " | ".join(head) + " |", "|---|---" + "|--:" * (len(head) - 2) + "|"]
+    for row in sorted(rows, key=speed):
+        if not row["runs"]:
+            lines.append(f"| {row['name']} | {row['config']} | " +
+                         " | ".join(["failed"] + [""] * (len(head) - 3)) + " |")
+            continue
+        cells = [row["name"], row["config"]] + [seconds(row["time_to"][f"{t:g}"]) for t in TAUS]
+        cells += [seconds(row["seconds_per_iteration"]), f"{row['iterations']:.0f}",
+                  f"{row['peak_bytes'] / 1e6:.0f}", f"{row['cpu_percent']:.0f}",
+                  f"{row['final_cost_independent']:.4f}",
+                  "" if row["spread"] is None else f"{100 * row['spread']:.0f} %"]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def speed(row, tau="0.001"):
+    """Sorting key: time to 1e-3, then to looser targets for those that miss it."""
+    if not row["runs"]:
+        return (2, 0.0)
+    value = row["time_to"][tau]
+    return (0, value) if value is not None else (1, row["final_cost_independent"])
+
+
+def strongest(rows, name, tau="1e-06"):
+    """The row of solver `name` that is quickest to f*(1 + tau), None when it has none there."""
+    rows = [r for r in rows if r["name"] == name and r["runs"] and r["time_to"][tau] is not None]
+    return min(rows, key=lambda r: r["time_to"][tau], default=None)

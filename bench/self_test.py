@@ -1,0 +1,115 @@
+# Copyright (c) 2026, the Sheaf authors.
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks of the bench's own arithmetic on canned runs: side_by_side.py --self-test"""
+import math
+import os
+import sys
+import tempfile
+import xml.dom.minidom
+
+import cost_plot
+import evaluate
+import run_table
+import side_by_side
+import write_pages
+
+sys.path.insert(0, os.path.join(side_by_side.HERE, "peers"))
+import peer_sheaf  # noqa: E402
+
+# Two cameras, two points, three observations; the residuals are worked out by hand below.
+TINY = """2 2 3
+0 0 1 0
+1 0 0 2
+0 1 0 0
+0 0 0  0 0 0  10 0 0
+0 0 1.5707963267948966  0 0 0  10 0.5 0
+1 0 -5
+0 0 -4
+"""
+
+
+def canned_run(name, trace, final, **more):
+    return {"name": name, "config": "x", "solver": name, "threads": 1, "trace": trace,
+            "seconds_per_iteration": 0.1, "setup_s": 0.1, "total_s": trace[-1][0],
+            "cpu_percent": 100, "peak_bytes": 1e6, "iterations": len(trace) - 1,
+            "final_cost_independent": final, **more}
+
+
+def canned_document():
+    runs = []
+    for slow in (1.0, 2.0, 30.0):  # one run of three is disturbed: medians must not see it
+        runs.append(canned_run("sheaf", [[0.1 * slow, 500.0], [0.2 * slow, 100.00001]], 100.00001))
+        runs.append(canned_run("ceres-head", [[1 * slow, 500.0], [2 * slow, 105.0],
+                                              [3 * slow, 100.0]], 100.0))
+        runs.append(canned_run("g2o", [[1 * slow, 500.0], [2 * slow, 150.0]], 150.0))
+    runs.append({"name": "gtsam", "config": "x", "threads": 1, "failed": "no memory"})
+    best = run_table.best_cost(runs)
+    return {"problem": "tiny.txt", "threads": 1, "best_cost": best, "runs": runs,
+            "header": {"cameras": 2, "points": 2, "observations": 3},
+            "summary": run_table.summarise(runs, best)}
+
+
+def check_evaluation():
+    # Camera 0 sees point 0 at 10 * (1, 0) / 5 = (2, 0): r = (1, 0). Camera 1 is turned by 90
+    # degrees: (0, 1) / 5 = p, n = 0.04, scale 10 * 1.02, so r = (0, 2.04 - 2). Point 1: r = 0.
+    expected = 0.5 * (1 + 0.04 ** 2)
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "tiny.txt")
+        with open(path, "w") as file:
+            file.write(TINY)
+        observations, cameras, points = evaluate.read_bal(path)
+        assert math.isclose(evaluate.cost(path, path), expected, rel_tol=1e-12)
+        assert math.isclose(evaluate.plain_cost(observations, cameras, points), expected,
+                            rel_tol=1e-12)
+
+
+def check_table():
+    document = canned_document()
+    rows = {r["name"]: r for r in document["summary"]}
+    assert document["best_cost"] == 100.0
+    assert rows["sheaf"]["time_to"]["1e-06"] == 0.4 and rows["sheaf"]["runs"] == 3
+    assert rows["ceres-head"]["time_to"]["0.1"] == 4.0
+    assert rows["ceres-head"]["time_to"]["0.01"] == 6.0
+    assert rows["g2o"]["time_to"]["0.1"] is None
+    text = run_table.markdown(document["summary"])
+    assert "| g2o | x | miss | miss | miss | miss | miss |" in text and "failed" in text
+    order = [line.split("|")[1].strip() for line in text.splitlines()[2:]]
+    assert order == ["sheaf", "ceres-head", "g2o", "gtsam"]
+    assert run_table.strongest(document["summary"], "g2o") is None
+    assert [run_table.seconds(v) for v in (None, 0.0123, 1.234, 12.34, 1234)] == [
+        "miss", "0.0123", "1.23", "12.3", "1234"]
+
+
+def check_plot():
+    document = canned_document()
+    drawn = side_by_side.curves(document)
+    assert [label for label, _ in drawn] == ["sheaf", "ceres-head x", "g2o x"]
+    svg = cost_plot.draw("a < b", drawn, document["best_cost"])
+    assert len(xml.dom.minidom.parseString(svg).getElementsByTagName("path")) > 10
+
+
+def check_sheaf_adapter():
+    steps = [{"index": 0, "cost": 9.0, "accepted": True, "time_s": 0.0},
+             {"index": 1, "cost": 9.0, "accepted": False, "time_s": 0.5},
+             {"index": 2, "cost": 4.0, "accepted": True, "time_s": 1.0}]
+    run = peer_sheaf.run_document({"time": {"setup_s": 0.25, "solve_s": 1.0}, "iterations": steps,
+                                   "memory": {"peak_bytes": 7}, "final_cost": 4.0}, "auto", 1, 99)
+    assert run["trace"] == [[0.25, 9.0], [1.25, 4.0]]
+    assert run["seconds_per_iteration"] == 0.5 and run["total_s"] == 1.25
+
+
+def check_pages():
+    results = {"date": "2026-01-01", "runs": 3, "machine": {"cpu": "a cpu", "cores": 2},
+               "missing": ["g2o-omp"], "problems": [canned_document()]}
+    table = write_pages.readme_table(results)
+    assert "| tiny | 1 | 0.400 | 6.00 | **15.0** |" in table, table
+    assert write_pages.between("a<!-- bench:begin -->old<!-- bench:end -->b", "new") == (
+        "a<!-- bench:begin -->\nnew<!-- bench:end -->b")
+    assert "a cpu" in write_pages.page(results, "plots")
+
+
+def run():
+    for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages):
+        check()
+        print(f"{check.__name__}: passed")
+    return 0

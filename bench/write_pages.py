@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+# Copyright (c) 2026, the Sheaf authors.
+# SPDX-License-Identifier: BSD-3-Clause
+"""BENCHMARKS.md and the README's table from results: write_pages.py RESULTS.json ROOT PLOTS [KERNELS.json]
+
+ROOT is the repository; PLOTS the folder with the SVGs, relative to it. KERNELS.json is the output
+of bench-kernels in Google Benchmark's format, when there is one.
+"""
+import json
+import os
+import sys
+
+import run_table
+import side_by_side
+
+BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
+TAU = "1e-06"
+# Columns of the README: the peers a reader looks for, with what to call them there.
+PEERS = (("ceres-head", "Ceres HEAD"), ("ceres-2.1", "Ceres 2.1"), ("g2o", "g2o"),
+         ("gtsam", "GTSAM"))
+
+
+def machine_text(machine):
+    words = [machine["cpu"], f"{machine['cores']} cores"]
+    if "double_gflops" in machine:
+        words += [machine["simd"], f"{machine['double_gflops']['one']:.0f} Gflop/s double a core",
+                  f"{machine['triad_gbytes_s']['all']:.0f} GB/s"]
+    return ", ".join(words)
+
+
+def stem(document):
+    return os.path.splitext(document["problem"])[0]
+
+
+def readme_table(results):
+    """Time to f*(1 + 1e-6) of every solver's strongest configuration, and ratios to ours."""
+    measured = {r["name"] for d in results["problems"] for r in d["summary"] if r["runs"]}
+    peers = [(name, text) for name, text in PEERS if name in measured]
+    head = ["problem", "threads", "sheaf, s"]
+    for _, text in peers:
+        head += [f"{text}, s", "ratio"]
+    lines = ["| " + " | ".join(head) + " |", "|---" + "|--:" * (len(head) - 1) + "|"]
+    for document in results["problems"]:
+        ours = run_table.strongest(document["summary"], "sheaf", TAU)
+        cells = [stem(document), str(document["threads"]),
+                 run_table.seconds(ours and ours["time_to"][TAU])]
+        for name, _ in peers:
+            cells += peer_cells(document, name, ours)
+        lines.append("| " + " | ".join(cells) + " |")
+    note = (f"Seconds from the built arrays to within 1e-6 of the best cost anyone found, set-up "
+            f"included, reading left out; medians of {results['runs']} interleaved runs. For each "
+            f"solver its quickest configuration measured. **Only the ratios (in bold) carry over "
+            f"to other machines; the seconds are those of this one:** "
+            f"{machine_text(results['machine'])}; {results['date']}. Ceres HEAD and g2o were built "
+            f"natively for it, with derivatives by hand; Ceres 2.1 is Debian's package. "
+            f"All configurations, targets and misses: [BENCHMARKS.md](BENCHMARKS.md).")
+    return "\n".join(lines) + "\n\n" + note + "\n"
+
+
+def peer_cells(document, name, ours):
+    row = run_table.strongest(document["summary"], name, TAU)
+    if row is None:
+        return ["miss", ""]
+    ratio = f"**{row['time_to'][TAU] / ours['time_to'][TAU]:.1f}**" if ours else ""
+    return [run_table.seconds(row["time_to"][TAU]), ratio]
+
+
+def kernel_table(path, machine):
+    """Google Benchmark's JSON: time, and rates beside the machine's own."""
+    with open(path) as file:
+        runs = [b for b in json.load(file)["benchmarks"] if b.get("run_type") != "aggregate"]
+    lines = ["| kernel | time, us | GB/s | of triad | Gflop/s | of peak |", "|---|--:|--:|--:|--:|--:|"]
+    scale = {"ns": 1e-3, "us": 1.0, "ms": 1e3, "s": 1e6}
+    for b in runs:
+        nbytes, flops = b.get("bytes_per_second"), b.get("flops")
+        triad = machine.get("triad_gbytes_s", {}).get("one")
+        peak = machine.get("double_gflops", {}).get("one")
+        lines.append("| " + " | ".join([
+            b["name"], f"{b['real_time'] * scale[b['time_unit']]:.1f}",
+            f"{nbytes / 1e9:.1f}" if nbytes else "",
+            f"{100 * nbytes / 1e9 / triad:.0f} %" if nbytes and triad else "",
+            f"{flops / 1e9:.1f}" if flops else "",
+            f"{100 * flops / 1e9 / peak:.0f} %" if flops and peak else ""]) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def page(results, plots, kernels=None):
+    """BENCHMARKS.md."""
+    machine = results["machine"]
+    out = ["# Benchmarks\n",
+           "Written by `bench/regenerate.sh`; do not edit. How it is measured: "
+           "[bench/README.md](bench/README.md).\n",
+           f"Machine: {machine_text(machine)}. {results['date']}. Medians of {results['runs']} "
+           "interleaved runs in fresh processes. Times are seconds until the cost is at or below "
+           "f* (1 + tau), f* the best cost anyone found, set-up included, reading left out; "
+           "\"miss\": never. Cost is 1/2 sum |r|^2, 9-parameter cameras, no loss. \"Final cost\" is "
+           "evaluated by code apart from all solvers. \"Spread\" is (max - min) / median of the "
+           "last target. One-thread runs that got less than 90 % of a core were repeated; what is "
+           "still below in the CPU column was disturbed, and seconds there are too long. "
+           "For sheaf the CPU column counts the whole process, reading and writing included.\n"]
+    if results["missing"]:
+        out.append(f"Not on this machine: {', '.join(results['missing'])}.\n")
+    out += ["## Summary\n", readme_table(results)]
+    for document in results["problems"]:
+        counts = ", ".join(f"{n} {what}" for what, n in document["header"].items())
+        out += [f"## {side_by_side.title(document)}\n",
+                f"{counts}; f* = {document['best_cost']:.6f}.\n",
+                run_table.markdown(document["summary"]),
+                f"![cost against time]({plots}/{side_by_side.plot_name(document)})\n"]
+    if kernels:
+        out += ["## Kernels\n", "One thread, beside what this machine can do at best.\n",
+                kernel_table(kernels, machine)]
+    return "\n".join(out)
+
+
+def between(text, table):
+    """`text` with what stands between the markers replaced; without markers it stays as it is."""
+    if BEGIN not in text or END not in text:
+        return text
+    return text[:text.index(BEGIN) + len(BEGIN)] + "\n" + table + text[text.index(END):]
+
+
+def main():
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    with open(sys.argv[1]) as file:
+        results = json.load(file)
+    root, plots = sys.argv[2:4]
+    kernels = sys.argv[4] if len(sys.argv) > 4 else None
+    with open(os.path.join(root, "BENCHMARKS.md"), "w") as file:
+        file.write(page(results, plots, kernels))
+    readme = os.path.join(root, "README.md")
+    with open(readme) as file:
+        text = file.read()
+    with open(readme, "w") as file:
+        file.write(between(text, readme_table(results)))
+
+
+if __name__ == "__main__":
+    main()
