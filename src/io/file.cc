@@ -113,6 +113,9 @@ Result<void> write(const Problem& problem, const std::filesystem::path& path) {
 }
 
 Result<void> check_writable(const std::filesystem::path& path) {
+  // Opening a pipe would wait for its reader, and closing it would end what that reads.
+  std::error_code ignored;
+  if (std::filesystem::is_fifo(path, ignored)) return {};
   Result<OutputFile> out = OutputFile::create(path, Compression::none);
   if (!out.ok()) return out.error();
   return {};

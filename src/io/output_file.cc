@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kLongestName = 200;  // of NAME in the partial's name: file systems allow 255
 constexpr std::size_t kCompressedBytes = 1 << 16;
+constexpr int kGzipLevel = 4;  // on BAL text three times as fast as 6 and 4% larger
 constexpr std::size_t kLargestPiece = 1 << 30;  // zlib and bzip2 count in 32 bits
 
 Error unwritable(const std::filesystem::path& path, const std::string& why) {
@@ -89,8 +90,8 @@ void OutputFile::open_compressor() {
   bool good;
   if (compression_ == Compression::gzip) {
     zlib_ = std::make_unique<z_stream>();
-    good = deflateInit2(zlib_.get(), Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8,
-                        Z_DEFAULT_STRATEGY) == Z_OK;
+    good =
+        deflateInit2(zlib_.get(), kGzipLevel, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) == Z_OK;
   } else {
     bzip2_ = std::make_unique<bz_stream>();
     good = BZ2_bzCompressInit(bzip2_.get(), 9, 0, 0) == BZ_OK;

@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <thread>
+
 #include "io/bytes.h"
 #include "io/output_file.h"
 #include "sheaf/io.h"
@@ -82,6 +84,20 @@ TEST(WriteFile, WritesDevicesDirectly) {
   EXPECT_TRUE(write(small_problem(), "/dev/null").ok());
   EXPECT_TRUE(check_writable("/dev/null").ok());
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+}
+
+TEST(WriteFile, WritesPipesDirectly) {
+  const test::Folder folder;
+  const std::filesystem::path fifo = folder / "fifo";
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_TRUE(check_writable(fifo).ok());  // and does not wait for a reader
+  Result<Problem> received = Error(ErrorCode::usage, "nothing was read");
+  std::thread reader([&] { received = read(fifo); });
+  EXPECT_TRUE(write(small_problem(), fifo).ok());
+  reader.join();
+  ASSERT_TRUE(received.ok()) << received.error().what();
+  EXPECT_EQ(received.value().points, small_problem().points);
+  EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(WriteFile, ReplacesTheTargetKeepingModeAndLinks) {
