@@ -79,6 +79,8 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   }
   V d[3];
   const V mask = lane_mask(group.lanes, lane);
+  if (group.lanes < 8)  // masked lanes stay where they are
+    for (V& x : s) x = hn::Mul(x, mask);
   const V damping = back_substitute(in.factors + kFactorGroup * g + lane, s, d);
   const V Y0 = hn::Add(X0, d[0]), Y1 = hn::Add(X1, d[1]), Y2 = hn::Add(X2, d[2]);
   double* Y = stepped + kPointGroup * g + lane;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -28,13 +29,17 @@ class Threads {
  public:
   /// count 0: as many as the machine offers to this process.
   explicit Threads(int count)
-      : arena_(count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency()),
-        count_(arena_.max_concurrency()) {}
+      : count_(count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency()),
+        allowed_(oneapi::tbb::global_control::max_allowed_parallelism,
+                 std::max(count_, oneapi::tbb::this_task_arena::max_concurrency())),
+        arena_(count_) {}
 
   int count() const { return count_; }
 
   /// Number of the calling thread within for_each, in [0, count()).
-  int worker() const { return count_ == 1 ? 0 : std::max(0, oneapi::tbb::this_task_arena::current_thread_index()); }
+  int worker() const {
+    return count_ == 1 ? 0 : std::max(0, oneapi::tbb::this_task_arena::current_thread_index());
+  }
 
   /// task(i) for every i in [0, tasks), each exactly once.
   template <class Task>
@@ -65,8 +70,10 @@ class Threads {
   }
 
  private:
-  oneapi::tbb::task_arena arena_;
   int count_;
+  /// More threads than cores run only where this allows them; the warning would be printed.
+  oneapi::tbb::global_control allowed_;
+  oneapi::tbb::task_arena arena_;
 };
 
 }  // namespace sheaf

@@ -1,0 +1,174 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "linear/kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "geometry/rotation.h"
+#include "linear/kernel_table.h"
+#include "sheaf/scene.h"
+
+namespace sheaf {
+namespace {
+
+/// Everything that the kernels produce from one state.
+struct Outcome {
+  Buffer<double> tiles, diagonal, factors, trial_points;
+  EliminateOutput eliminated{};
+  TrialOutput trial{};
+  double square_sum = 0;
+  std::uint64_t behind = 0;
+};
+
+class KernelsTest : public ::testing::Test {
+ protected:
+  void make(bool points_held) {
+    points_held_ = points_held;
+    SceneOptions options;
+    options.images = 9;
+    options.points = 700;
+    options.mean_track = 4.3;
+    Problem problem = generate(options).value().start;
+    // One image sees a point twice; one point is behind its cameras; one is seen once.
+    problem.add_observation(problem.observation_image[0], problem.observation_point[0], 3, 4);
+    const std::uint32_t lonely = problem.add_point(0.1, 0.2, 0.3);
+    problem.add_observation(2, lonely, 10, -20);
+    batches_ = arrange(problem);
+    chunks_ = cut_into_chunks(batches_, 9, !points_held, threads_);
+    fill(problem);
+  }
+
+  void fill(const Problem& problem) {
+    cameras_.allocate(kCameraRecord * problem.num_images());
+    trial_cameras_.allocate(cameras_.size());
+    for (std::size_t i = 0; i < problem.num_images(); ++i) {
+      double* c = &cameras_[kCameraRecord * i];
+      const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
+      std::copy(R.begin(), R.end(), c);
+      for (int k = 0; k < 3; ++k) {
+        c[9 + k] = problem.poses[i].translation[k];
+        c[12 + k] = problem.cameras[i].parameters[k];
+      }
+      for (int k = 0; k < 9; ++k) c[15 + k] = 1e-3 * std::sin(double(9 * i + k));
+      double* t = &trial_cameras_[kCameraRecord * i];
+      std::copy(c, c + kCameraRecord, t);
+      t[9] += 0.01;
+      t[12] *= 1.001;
+    }
+    points_.allocate(kPointGroup * batches_.groups.size());
+    for (std::size_t g = 0; g < batches_.groups.size(); ++g)
+      for (int l = 0; l < 8; ++l)
+        for (int d = 0; d < 3; ++d)
+          points_[kPointGroup * g + 8 * d + l] =
+              problem.points[3 * std::size_t(batches_.lane_point[8 * g + l]) + d];
+  }
+
+  Outcome run(const Kernels& kernels) {
+    Outcome out;
+    out.tiles.allocate(kTileDoubles * chunks_.tiles.size());
+    out.tiles.fill(0);
+    out.diagonal.allocate(kDiagonalDoubles * 9);
+    out.diagonal.fill(0);
+    out.factors.allocate(kFactorGroup * batches_.groups.size());
+    out.factors.fill(0);
+    out.trial_points.allocate(points_.size());
+    Buffer<double> scratch(scratch_doubles(batches_, chunks_));
+    const EliminateInput in{&batches_,      &chunks_, cameras_.data(),
+                            points_.data(), 1e-3,     points_held_};
+    out.eliminated.factors = out.factors.data();
+    for (const Chunk& chunk : chunks_.chunks)
+      kernels.eliminate(in, chunk, {out.tiles.data(), out.diagonal.data()}, scratch.data(),
+                        out.eliminated);
+    const TrialInput trial{&batches_,      cameras_.data(),    trial_cameras_.data(),
+                           points_.data(), out.factors.data(), true};
+    out.trial.points = out.trial_points.data();
+    for (const Chunk& chunk : chunks_.chunks) {
+      kernels.trial(trial, chunk, out.trial);
+      out.square_sum += kernels.square_sum(batches_, cameras_.data(), points_.data(), chunk);
+      out.behind += kernels.count_behind(batches_, cameras_.data(), points_.data(), chunk);
+    }
+    return out;
+  }
+
+  Threads threads_{1};
+  Batches batches_;
+  Chunks chunks_;
+  Buffer<double> cameras_, trial_cameras_, points_;
+  bool points_held_ = false;
+};
+
+void expect_close(const Buffer<double>& a, const Buffer<double>& b, double tolerance,
+                  const std::string& what) {
+  ASSERT_EQ(a.size(), b.size());
+  double scale = 0;
+  for (double x : b) scale = std::max(scale, std::abs(x));
+  for (std::size_t i = 0; i < a.size(); ++i)
+    ASSERT_NEAR(a[i], b[i], tolerance * (std::abs(b[i]) + 1e-6 * scale)) << what << " " << i;
+}
+
+/// The entries that mean something: 83 of a tile's 88 doubles and 91 of a diagonal block's 96 are
+/// sums; lanes beyond a group's points are padding.
+void clear_padding(const Batches& batches, Outcome& o) {
+  for (std::size_t g = 0; g < batches.groups.size(); ++g)
+    for (std::uint32_t l = batches.groups[g].lanes; l < 8; ++l) {
+      for (int k = 0; k < 12; ++k) o.factors[kFactorGroup * g + 8 * k + l] = 0;
+      for (int k = 0; k < 3; ++k) o.trial_points[kPointGroup * g + 8 * k + l] = 0;
+    }
+}
+
+TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
+  for (bool held : {false, true}) {
+    make(held);
+    Outcome expected = run(reference_kernels());
+    clear_padding(batches_, expected);
+    for (const Kernels* kernels : available_kernels()) {
+      SCOPED_TRACE(kernels->name);
+      Outcome got = run(*kernels);
+      clear_padding(batches_, got);
+      expect_close(got.tiles, expected.tiles, 1e-9, "tile");
+      expect_close(got.diagonal, expected.diagonal, 1e-8, "diagonal");
+      expect_close(got.factors, expected.factors, 1e-9, "factor");
+      expect_close(got.trial_points, expected.trial_points, 1e-11, "trial point");
+      const auto near = [](double a, double b) { EXPECT_NEAR(a, b, 1e-10 * std::abs(b)); };
+      near(got.eliminated.square_sum, expected.eliminated.square_sum);
+      near(got.eliminated.point_decrease, expected.eliminated.point_decrease);
+      near(got.eliminated.gradient_max2, expected.eliminated.gradient_max2);
+      near(got.trial.square_sum, expected.trial.square_sum);
+      near(got.trial.damping_term, expected.trial.damping_term);
+      near(got.trial.step2_max, expected.trial.step2_max);
+      near(got.square_sum, expected.square_sum);
+      EXPECT_EQ(got.trial.newly_behind, expected.trial.newly_behind);
+      EXPECT_EQ(got.behind, expected.behind);
+      EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
+    }
+  }
+}
+
+TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
+  make(false);
+  std::vector<const Kernels*> fused;
+  for (const Kernels* kernels : available_kernels())
+    if (kernels->fused) fused.push_back(kernels);
+  if (fused.size() < 2) GTEST_SKIP() << "this machine runs fewer than two such sets";
+  const Outcome first = run(*fused[0]);
+  for (std::size_t k = 1; k < fused.size(); ++k) {
+    SCOPED_TRACE(fused[k]->name);
+    const Outcome other = run(*fused[k]);
+    const auto same = [](const Buffer<double>& a, const Buffer<double>& b) {
+      return std::memcmp(a.data(), b.data(), a.bytes()) == 0;
+    };
+    EXPECT_TRUE(same(first.tiles, other.tiles));
+    EXPECT_TRUE(same(first.diagonal, other.diagonal));
+    EXPECT_TRUE(same(first.factors, other.factors));
+    EXPECT_TRUE(same(first.trial_points, other.trial_points));
+    EXPECT_EQ(first.trial.square_sum, other.trial.square_sum);
+    EXPECT_EQ(first.eliminated.square_sum, other.eliminated.square_sum);
+  }
+}
+
+}  // namespace
+}  // namespace sheaf
