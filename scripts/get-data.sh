@@ -11,7 +11,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-folder=${SHEAF_DATA:-data}/bal
+top=${SHEAF_DATA:-data}
+folder=$top/bal
 target=$folder/dubrovnik-16-22106-pre.txt
 sha256=e128b6b076399db26007a92323d98fe7b48db2a31089240273f40f582e612a91
 name=problem-16-22106-pre.txt
@@ -28,12 +29,12 @@ if is_right "$target"; then
   say "$target is there, checksum verified"
   exit 0
 fi
-mkdir -p "$folder" 2>/dev/null || true
-if [ ! -w "$folder" ]; then
-  say "cannot write to $folder: going on without $name"
+mkdir -p "$top" 2>/dev/null || true
+if [ ! -w "$top" ]; then
+  say "cannot write to $top: going on without $name"
   exit 1
 fi
-failed_mark=$folder/.download-failed
+failed_mark=$top/.download-failed
 if [ "${1:-}" != --retry ] && [ -n "$(find "$failed_mark" -mmin -1440 2>/dev/null)" ]; then
   say "the download failed less than a day ago (scripts/get-data.sh --retry asks again)"
   exit 1
@@ -95,6 +96,7 @@ PYTHON
 }
 
 if from_source_package || from_bal_page; then
+  mkdir -p "$folder"
   mv "$scratch/found.txt" "$target"
   chmod 644 "$target"
   rm -f "$failed_mark"

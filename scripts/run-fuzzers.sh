@@ -23,7 +23,7 @@ if [ -z "$compiler" ]; then
   exit 0
 fi
 
-scripts/build.sh fuzz -DCMAKE_CXX_COMPILER="$compiler"
+scripts/build.sh fuzz --target fuzz/all -DCMAKE_CXX_COMPILER="$compiler"
 mapfile -t targets < <(find build/fuzz/fuzz -maxdepth 1 -type f -executable -name '*fuzz*' | sort)
 if [ ${#targets[@]} = 0 ]; then
   echo "fuzz: no target was built" >&2
