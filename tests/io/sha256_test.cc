@@ -9,11 +9,17 @@
 namespace sheaf {
 namespace {
 
-std::string digest(const std::string& message, std::size_t piece) {
-  Sha256 hash;
+std::string digest(const std::string& message, std::size_t piece,
+                   Sha256::Path path = Sha256::Path::best) {
+  Sha256 hash(path);
   for (std::size_t i = 0; i < message.size(); i += piece)
     hash.update(message.data() + i, std::min(piece, message.size() - i));
   return hash.hex_digest();
+}
+
+TEST(Sha256, PortablePathMatchesPublishedVectors) {
+  EXPECT_EQ(digest(std::string(1000000, 'a'), 4096, Sha256::Path::portable),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
 // The examples of FIPS 180-4.
@@ -32,6 +38,7 @@ TEST(Sha256, DoesNotDependOnThePieces) {
     for (std::size_t i = 0; i < size; ++i) message[i] = static_cast<char>(31 * i + size);
     const std::string whole = digest(message, size);
     for (std::size_t piece : {1, 3, 63, 64}) EXPECT_EQ(digest(message, piece), whole) << size;
+    EXPECT_EQ(digest(message, size, Sha256::Path::portable), whole) << size;
   }
 }
 
