@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "sheaf/sheaf.h"
@@ -23,9 +24,11 @@ struct Arguments {
 
 int run(const Arguments& arguments) {
   const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out}, {"--json", json}});
   const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  interrupt.begin_write();
   const Timer writing;
   write(input.problem, arguments.out).value();
   const double write_s = writing.seconds();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "inspect/statistics.h"
+#include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "scene_arguments.h"
@@ -39,9 +40,11 @@ Json document_of(const Arguments& arguments, const Scene& scene, const Statistic
 
 int run(const Arguments& arguments) {
   const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out}, {"--truth", arguments.truth}, {"--json", json}});
   const Scene scene = generate(arguments.scene).value();
+  interrupt.begin_write();
   const Timer writing;
   write(scene.start, arguments.out).value();
   if (!arguments.truth.empty()) write(scene.truth, arguments.truth).value();

@@ -37,15 +37,16 @@ Interrupt::~Interrupt() {
 
 void Interrupt::watch() {
   const sigset_t signals = watched_signals();
-  while (true) {
+  for (int taken = 0;; ++taken) {
     int signal = 0;
-    if (sigwait(&signals, &signal) != 0) continue;
+    while (sigwait(&signals, &signal) != 0) continue;
     const Phase phase = phase_;
     if (phase == Phase::over) return;
-    if (phase == Phase::write) continue;
-    if (phase == Phase::read || stop_.stop_requested()) std::_Exit(kExitInterrupted);
+    if (phase == Phase::read || taken > 0) std::_Exit(kExitInterrupted);
     if (!quiet_)
-      std::fputs("interrupted: the best state will be written (again: end at once without)\n",
+      std::fputs(phase == Phase::solve
+                     ? "interrupted: the best state will be written (again: end at once without)\n"
+                     : "interrupted: the file will be finished (again: end at once)\n",
                  stderr);
     stop_.request_stop();
   }

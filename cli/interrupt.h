@@ -10,7 +10,8 @@ namespace sheaf {
 
 /// What Ctrl-C (SIGINT) and SIGTERM do. Until `begin_solve` they end the command at once: there is
 /// nothing to save. From then on the first one asks the solver to stop, so that its best state can
-/// be written, and a second one ends the command at once. From `begin_write` on they wait.
+/// be written. From `begin_write` on the first one waits for the file. A second one always ends the
+/// command at once.
 ///
 /// Construct it before any thread is started: the signals are blocked in the constructing thread
 /// and all that it starts later, and one thread waits for them.

@@ -18,7 +18,7 @@ constexpr std::size_t kMostListed = 1000;
 Json iteration_json(const Iteration& it) {
   return {{"index", it.index},
           {"cost", number(it.cost)},
-          {"trial_cost", it.index == 0 ? Json() : number(it.trial_cost)},
+          {"trial_cost", number(it.trial_cost)},
           {"accepted", it.accepted},
           {"damping", number(it.damping)},
           {"gain_ratio", number(it.gain_ratio)},
@@ -128,8 +128,8 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
           {"plain_cost",
            {{"before", number(record.before.cost)}, {"after", number(record.after.cost)}}},
           {"behind_camera",
-           {{"before", observations_json(s.behind_camera_before, problem)},
-            {"after", observations_json(s.behind_camera_after, problem)}}},
+           {{"before", observations_json(record.before.behind, problem)},
+            {"after", observations_json(record.after.behind, problem)}}},
           {"rejected_observations", observations_json(s.rejected_observations, problem)}};
 }
 

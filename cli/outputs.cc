@@ -14,7 +14,7 @@ namespace sheaf {
 void check_outputs(const std::vector<NamedOutput>& outputs) {
   const auto normal = [](const std::string& path) {
     std::error_code ignored;
-    return std::filesystem::weakly_canonical(path, ignored);
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ignored), ignored);
   };
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (outputs[i].path.empty()) continue;

@@ -62,9 +62,7 @@ Vector3<double> Similarity::operator()(const Vector3<double>& X) const {
   return out;
 }
 
-Similarity align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
-                 bool& unique) {
-  unique = false;
+Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to) {
   if (from.empty()) return {};
   const Vector3<double> a = mean_of(from), b = mean_of(to);
   double S[3][3] = {};  // sum of (from - a) (to - b)^T
@@ -82,14 +80,14 @@ Similarity align(const std::vector<Vector3<double>>& from, const std::vector<Vec
                       {zx, S[0][1] + S[1][0], S[1][1] - S[0][0] - S[2][2], S[1][2] + S[2][1]},
                       {xy, S[2][0] + S[0][2], S[1][2] + S[2][1], S[2][2] - S[0][0] - S[1][1]}}};
   const auto eigen = eigenvectors(N);
-  unique = eigen[0].first - eigen[1].first > 1e-6 * std::fabs(eigen[0].first);
   Similarity out;
   out.rotation = normalized(eigen[0].second);
   // At the optimum trace(R S) is the largest eigenvalue, and s = trace(R S) / sum |from - a|^2.
   if (from_square > 0) out.scale = eigen[0].first / from_square;
   const Vector3<double> moved = out(a);
   for (int k = 0; k < 3; ++k) out.translation[k] = b[k] - moved[k];
-  return out;
+  const double largest = std::fabs(eigen[0].first);
+  return {out, largest > 0 ? (eigen[0].first - eigen[1].first) / largest : 0};
 }
 
 }  // namespace sheaf

@@ -18,11 +18,15 @@ struct Similarity {
   Vector3<double> operator()(const Vector3<double>& X) const;
 };
 
+struct Alignment {
+  Similarity similarity;
+  /// How well the points determine the rotation, from 0 (not at all: fewer than three places, or
+  /// places on a line) to about 1: the relative distance of the two largest eigenvalues.
+  double certainty = 0;
+};
+
 /// The similarity that minimises sum |to_i - S(from_i)|^2 (Horn 1987: the rotation is the largest
-/// eigenvector of a symmetric 4x4 matrix). Sets `unique` to whether the points determine the
-/// rotation, which fewer than three or points on a line do not; the scale is 1 where `from` is a
-/// single place.
-Similarity align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
-                 bool& unique);
+/// eigenvector of a symmetric 4x4 matrix). The scale is 1 where `from` is a single place.
+Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to);
 
 }  // namespace sheaf

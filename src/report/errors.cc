@@ -38,10 +38,13 @@ std::vector<Vector3<double>> points_of(const Problem& problem) {
   return out;
 }
 
-Similarity similarity_between(const Problem& estimate, const Problem& reference, bool& unique) {
-  const Similarity by_centers = align(centers_of(estimate), centers_of(reference), unique);
-  if (unique) return by_centers;
-  return align(points_of(estimate), points_of(reference), unique);
+// Below this certainty noise in the places turns the whole scene.
+constexpr double kCertain = 0.01;
+
+Alignment alignment_between(const Problem& estimate, const Problem& reference) {
+  const Alignment by_centers = align(centers_of(estimate), centers_of(reference));
+  if (by_centers.certainty > kCertain) return by_centers;
+  return align(points_of(estimate), points_of(reference));
 }
 
 }  // namespace
@@ -67,8 +70,9 @@ Result<StateErrors> compare_states(const Problem& estimate, const Problem& refer
                                        std::to_string(reference.num_points()));
   Similarity similarity;
   if (aligned) {
-    Similarity found = similarity_between(estimate, reference, aligned);
-    if (aligned) similarity = found;
+    const Alignment found = alignment_between(estimate, reference);
+    aligned = found.certainty > 1e-6;
+    if (aligned) similarity = found.similarity;
   }
   const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
   std::vector<double> rotation, translation, center, point;

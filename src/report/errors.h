@@ -27,7 +27,8 @@ struct StateErrors {
 };
 
 /// Errors: ErrorCode::usage when the counts differ. Where the camera centres do not determine a
-/// rotation (fewer than three, or on a line), the points take their place in the alignment.
+/// rotation well (fewer than three, or almost on a line), the points take their place in the
+/// alignment.
 Result<StateErrors> compare_states(const Problem& estimate, const Problem& reference, bool align);
 
 }  // namespace sheaf

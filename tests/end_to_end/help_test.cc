@@ -1,0 +1,91 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "end_to_end/command.h"
+
+namespace sheaf {
+namespace {
+
+const std::set<std::string> kCommon = {"--help", "--json", "--threads", "--quiet"};
+const std::set<std::string> kScene = {"--cameras",     "--points",         "--mean-track",
+                                      "--pixel-noise", "--rotation-noise", "--center-noise",
+                                      "--point-noise", "--focal-noise",    "--seed"};
+
+std::set<std::string> options_of(const std::string& verb) {
+  std::set<std::string> options = kCommon;
+  if (verb == "generate" || verb == "demo") options.insert(kScene.begin(), kScene.end());
+  if (verb == "generate") options.insert("--truth");
+  if (verb == "demo") options.insert("--ply");
+  if (verb == "solve")
+    options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
+                    "--cheirality", "--fix", "--solver", "--initial-damping", "--simd"});
+  return options;
+}
+
+// Options begin a line of the help, after short names.
+std::set<std::string> options_in(const std::string& help) {
+  std::set<std::string> options;
+  const std::regex line(R"(\n\s+(?:-\w,)?(--[a-z0-9-]+))");
+  for (std::sregex_iterator match(help.begin(), help.end(), line), end; match != end; ++match)
+    options.insert((*match)[1]);
+  return options;
+}
+
+std::vector<std::string> example_in(const std::string& help) {
+  const std::size_t at = help.find("Example:\n");
+  if (at == std::string::npos) return {};
+  std::istringstream line(help.substr(at + 9, help.find('\n', at + 9) - at - 9));
+  std::vector<std::string> words;
+  for (std::string word; line >> word;) words.push_back(word);
+  return words;
+}
+
+class Help : public testing::TestWithParam<const char*> {};
+
+TEST_P(Help, NamesEveryOptionAndOnlyThose) {
+  TemporaryFolder folder;
+  const Outcome outcome = run_command({GetParam(), "--help"}, folder.path());
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(options_in(outcome.out), options_of(GetParam()));
+}
+
+TEST_P(Help, ExampleRuns) {
+  TemporaryFolder folder;
+  ASSERT_EQ(run_command({"generate", "problem.txt", "--points", "300"}, folder.path()).exit_code,
+            0);
+  std::vector<std::string> words =
+      example_in(run_command({GetParam(), "--help"}, folder.path()).out);
+  ASSERT_GE(words.size(), 2u);
+  EXPECT_EQ(words[0], "sheaf");
+  EXPECT_EQ(words[1], GetParam());
+  words.erase(words.begin());
+  const Outcome outcome = run_command(words, folder.path());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_GE(folder.names().size(), 2u) << "the example writes a file";
+}
+
+INSTANTIATE_TEST_SUITE_P(Verbs, Help,
+                         testing::Values("solve", "info", "convert", "generate", "demo"),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
+  TemporaryFolder folder;
+  const Outcome help = run_command({"--help"}, folder.path());
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* verb : {"solve", "info", "convert", "generate", "demo"})
+    EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
+  const Outcome version = run_command({"--version"}, folder.path());
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_TRUE(std::regex_match(version.out, std::regex(R"(sheaf \d+\.\d+\.\d+\n)")));
+}
+
+}  // namespace
+}  // namespace sheaf

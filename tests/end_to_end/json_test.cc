@@ -1,0 +1,221 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "end_to_end/command.h"
+#include "sheaf/io.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+namespace {
+
+using nlohmann::json;
+
+// Keys in the first column of the tables of one section of docs/json.md.
+std::set<std::string> documented(const std::string& section) {
+  std::istringstream document(contents_of(std::string(SHEAF_SOURCE_DIR) + "/docs/json.md"));
+  std::set<std::string> keys;
+  const std::regex key("`([^`]+)`");
+  bool inside = false;
+  for (std::string line; std::getline(document, line);) {
+    if (line.rfind("## ", 0) == 0) inside = line == "## " + section;
+    if (!inside || line.rfind("| `", 0) != 0) continue;
+    const std::string cell = line.substr(2, line.find(" |", 2) - 2);
+    for (std::sregex_iterator match(cell.begin(), cell.end(), key), end; match != end; ++match)
+      keys.insert((*match)[1]);
+  }
+  return keys;
+}
+
+bool has_keys(const json& value, const std::set<std::string>& keys) {
+  std::set<std::string> found;
+  for (const auto& [name, ignored] : value.items()) found.insert(name);
+  return found == keys;
+}
+
+bool is_list(const json& value) { return has_keys(value, {"count", "first"}); }
+
+bool is_errors(const json& value) {
+  if (!has_keys(value, {"aligned", "scale", "rotation_error_rad", "translation_error",
+                        "center_error", "point_error"}))
+    return false;
+  for (const char* kind :
+       {"rotation_error_rad", "translation_error", "center_error", "point_error"})
+    if (!has_keys(value[kind], {"mean", "median", "rms", "max"})) return false;
+  return true;
+}
+
+void collect(const json& value, const std::string& at, std::set<std::string>& keys) {
+  if (value.is_object() && !is_list(value) && !is_errors(value)) {
+    for (const auto& [name, inner] : value.items())
+      collect(inner, at.empty() ? name : at + "." + name, keys);
+  } else if (value.is_array() && !value.empty() && value[0].is_object()) {
+    for (const json& inner : value) collect(inner, at + "[]", keys);
+  } else {
+    keys.insert(at);
+  }
+}
+
+std::set<std::string> produced(const json& document) {
+  std::set<std::string> keys;
+  collect(document, "", keys);
+  return keys;
+}
+
+class JsonTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome outcome =
+        run({"generate", "in.txt", "--points", "400", "--json", "generate.json"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  Outcome run(const std::vector<std::string>& arguments) {
+    return run_command(arguments, folder_.path());
+  }
+  // Every key that is documented is there, and the other way round.
+  void expect_documented(const std::string& verb, const std::vector<std::string>& sections) {
+    std::set<std::string> keys;
+    for (const std::string& section : sections) keys.merge(documented(section));
+    EXPECT_GT(keys.size(), 5u);
+    EXPECT_EQ(produced(json_of(folder_ / (verb + ".json"))), keys);
+  }
+  TemporaryFolder folder_;
+};
+
+const char* const kShared = "Parts that several verbs share";
+
+TEST_F(JsonTest, SolveHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"solve", "in.txt", "--json", "solve.json"}).exit_code, 0);
+  expect_documented("solve", {kShared, "solve"});
+}
+
+TEST_F(JsonTest, InfoHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
+  expect_documented("info", {kShared, "info"});
+}
+
+TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"convert", "in.txt", "o.txt.gz", "--json", "convert.json"}).exit_code, 0);
+  expect_documented("convert", {kShared, "convert"});
+  const json document = json_of(folder_ / "convert.json");
+  EXPECT_EQ(document["output"]["bytes"], std::filesystem::file_size(folder_ / "o.txt.gz"));
+}
+
+TEST_F(JsonTest, GenerateHasTheDocumentedKeys) { expect_documented("generate", {"generate"}); }
+
+TEST_F(JsonTest, DemoHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"demo", "--points", "400", "--json", "demo.json"}).exit_code, 0);
+  expect_documented("demo", {kShared, "solve", "demo"});
+  const json errors = json_of(folder_ / "demo.json")["errors"];
+  EXPECT_LT(errors["after"]["point_error"]["median"], errors["before"]["point_error"]["median"]);
+}
+
+TEST_F(JsonTest, SolveTellsWhatHappened) {
+  ASSERT_EQ(run({"solve",
+                 "in.txt",
+                 "-o",
+                 "o.txt",
+                 "--json",
+                 "s.json",
+                 "--fix",
+                 "k1,pose=0",
+                 "--max-iterations",
+                 "7",
+                 "--tolerance",
+                 "1e-12",
+                 "--threads",
+                 "2",
+                 "--cheirality",
+                 "reject",
+                 "--solver",
+                 "dense",
+                 "--initial-damping",
+                 "0.01",
+                 "--time-limit",
+                 "60"})
+                .exit_code,
+            0);
+  const json s = json_of(folder_ / "s.json");
+  EXPECT_EQ(s["options"], (json{{"max_iterations", 7},
+                                {"tolerance", 1e-12},
+                                {"time_limit_s", 60.0},
+                                {"cheirality", "reject"},
+                                {"fix", {"k1", "pose=0"}},
+                                {"solver", "dense"},
+                                {"initial_damping", 0.01},
+                                {"simd", "best"}}));
+  EXPECT_EQ(s["input"]["path"], "in.txt");
+  EXPECT_EQ(s["input"]["cameras"], 16);
+  EXPECT_EQ(s["input"]["poses"], 16);
+  EXPECT_EQ(s["input"]["points"], 400);
+  EXPECT_EQ(s["input"]["sha256"].get<std::string>().size(), 64u);
+  EXPECT_EQ(s["solver"]["name"], "dense");
+  EXPECT_EQ(s["threads"], 2);
+  const auto& iterations = s["iterations"];
+  EXPECT_LE(iterations.size(), 8u);
+  EXPECT_EQ(iterations[0]["cost"], s["initial_cost"]);
+  EXPECT_EQ(iterations[0]["trial_cost"], s["initial_cost"]);
+  EXPECT_EQ(iterations.back()["cost"], s["final_cost"]);
+  for (std::size_t i = 0; i < iterations.size(); ++i) {
+    EXPECT_EQ(iterations[i]["index"], i);
+    if (i > 0) {
+      EXPECT_LE(iterations[i]["cost"], iterations[i - 1]["cost"]);
+    }
+  }
+  EXPECT_EQ(iterations[1]["damping"], 0.01);
+  const double total = s["time"]["total_s"];
+  EXPECT_GE(total, s["time"]["solve_s"].get<double>() + s["time"]["setup_s"].get<double>());
+}
+
+TEST_F(JsonTest, CostsAgreeWithIndependentCodeAndCarryEveryDigit) {
+  ASSERT_EQ(run({"solve", "in.txt", "-o", "o.txt", "--json", "s.json"}).exit_code, 0);
+  const json s = json_of(folder_ / "s.json");
+  const Evaluation before = evaluate(read(folder_ / "in.txt").value());
+  const Evaluation after = evaluate(read(folder_ / "o.txt").value());
+  EXPECT_EQ(s["plain_cost"]["before"].get<double>(), before.cost);
+  EXPECT_NEAR(s["plain_cost"]["after"].get<double>(), after.cost, 1e-11 * after.cost);
+  EXPECT_NEAR(s["final_cost"].get<double>(), after.cost, 1e-10 * after.cost);
+  EXPECT_NEAR(s["initial_cost"].get<double>(), before.cost, 1e-10 * before.cost);
+  EXPECT_NEAR(s["rms_px"]["after"].get<double>(), after.rms_px, 1e-10 * after.rms_px);
+}
+
+TEST_F(JsonTest, ObservationsBehindTheirCameraAreListed) {
+  // Image 0 looks along -z from the origin; point 1 lies behind it.
+  write_text(folder_ / "behind.txt",
+             "2 2 4\n0 0 1 2\n1 0 3 4\n0 1 5 6\n1 1 7 8\n"
+             "0 0 0 0 0 0 500 0 0\n0 0 0 0 0 -30 500 0 0\n0 0 -10\n1 1 20\n");
+  ASSERT_EQ(run({"info", "behind.txt", "--json", "i.json"}).exit_code, 0);
+  const json list = json_of(folder_ / "i.json")["behind_camera"];
+  EXPECT_EQ(list,
+            (json{{"count", 1}, {"first", {{{"observation", 2}, {"image", 0}, {"point", 1}}}}}));
+  ASSERT_EQ(run({"solve", "behind.txt", "--json", "s.json", "--cheirality", "hold-out",
+                 "--max-iterations", "2"})
+                .exit_code,
+            0);
+  const json s = json_of(folder_ / "s.json");
+  EXPECT_EQ(s["behind_camera"]["before"], list);
+  EXPECT_EQ(s["rejected_observations"], list);
+}
+
+TEST_F(JsonTest, ProgressGoesToStderrAndQuietSilencesIt) {
+  const Outcome loud = run({"solve", "in.txt"});
+  EXPECT_NE(loud.err.find("iteration 1"), std::string::npos);
+  EXPECT_EQ(loud.out.find("iteration 1"), std::string::npos);
+  EXPECT_NE(loud.out.find("cost"), std::string::npos);
+  for (const char* verb : {"solve", "info"}) {
+    const Outcome quiet = run({verb, "in.txt", "--quiet"});
+    EXPECT_EQ(quiet.exit_code, 0);
+    EXPECT_EQ(quiet.err, "");
+    EXPECT_NE(quiet.out, "");
+  }
+}
+
+}  // namespace
+}  // namespace sheaf
