@@ -18,16 +18,16 @@ sha256=e128b6b076399db26007a92323d98fe7b48db2a31089240273f40f582e612a91
 name=problem-16-22106-pre.txt
 page=https://grail.cs.washington.edu/projects/bal/data/dubrovnik/$name.bz2
 
-if ! command -v python3 >/dev/null; then
-  echo "get-data: python3 is missing: scripts/install-deps.sh installs it"
-  exit 1
-fi
 say() { echo "get-data: $*"; }
 is_right() { [ -f "$1" ] && [ "$(sha256sum <"$1" | cut -d' ' -f1)" = "$sha256" ]; }
 
 if is_right "$target"; then
   say "$target is there, checksum verified"
   exit 0
+fi
+if ! command -v python3 >/dev/null; then
+  say "python3 is missing: scripts/install-deps.sh installs it"
+  exit 1
 fi
 mkdir -p "$top" 2>/dev/null || true
 if [ ! -w "$top" ]; then
