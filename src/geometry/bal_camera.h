@@ -32,8 +32,9 @@ std::array<Scalar, 2> project(const BalCamera<Scalar>& camera, const Vector3<Sca
 template <class Scalar>
 struct BalJacobian {
   std::array<Scalar, 2> pixel;
-  std::array<Scalar, 18> camera;  ///< 2x9: [rho (3), phi (3), f, k1, k2], left perturbation of SE(3)
-  std::array<Scalar, 6> point;    ///< 2x3: d pixel / d X (world)
+  std::array<Scalar, 18>
+      camera;                   ///< 2x9: [rho (3), phi (3), f, k1, k2], left perturbation of SE(3)
+  std::array<Scalar, 6> point;  ///< 2x3: d pixel / d X (world)
 };
 
 /// Pixel and exact Jacobians of u = project(R X + t), R row-major.

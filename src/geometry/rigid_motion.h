@@ -23,7 +23,8 @@ Vector3<Scalar> left_jacobian_times(const Vector3<Scalar>& phi, const Vector3<Sc
   const Scalar a2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
   Scalar b, c;
   if (a2 < Scalar(1e-4)) {
-    b = Scalar(0.5) - a2 / Scalar(24) * (Scalar(1) - a2 / Scalar(30) * (Scalar(1) - a2 / Scalar(56)));
+    b = Scalar(0.5) -
+        a2 / Scalar(24) * (Scalar(1) - a2 / Scalar(30) * (Scalar(1) - a2 / Scalar(56)));
     c = Scalar(1) / Scalar(6) -
         a2 / Scalar(120) * (Scalar(1) - a2 / Scalar(42) * (Scalar(1) - a2 / Scalar(72)));
   } else {

@@ -75,12 +75,17 @@ Step BundleSystem::propose(double damping) {
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[threads_.worker()];
     if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
-    const SliceSums sums{tiles_.data() + s * tile_doubles, &diagonal_[s * diagonal_doubles]};
-    std::fill_n(sums.tiles, tile_doubles, 0.0);
-    std::fill_n(sums.diagonal, diagonal_doubles, 0.0);
+    const Records records = records_in(scratch.data(), chunks_);
+    double* tiles = tiles_.data() + s * tile_doubles;
+    double* diagonal = diagonal_.data() + s * diagonal_doubles;
+    std::fill_n(tiles, tile_doubles, 0.0);
+    std::fill_n(diagonal, diagonal_doubles, 0.0);
     outputs[s] = {factors_.data(), 0, 0, 0};
-    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
-      kernels_.eliminate(in, chunks_.chunks[c], sums, scratch.data(), outputs[s]);
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
+      kernels_.linearize(in, chunks_.chunks[c], records, outputs[s]);
+      kernels_.diagonal(chunks_, chunks_.chunks[c], records, diagonal);
+      kernels_.pairs(chunks_, chunks_.chunks[c], records, tiles);
+    }
   });
   add_slices();
   return collect_step(damping, outputs);
@@ -151,8 +156,15 @@ double BundleSystem::step_cameras() {
     for (int j = 0; j < 3; ++j)
       if (c[6 + j] >= 0) trial_lenses_[lens][j] = k[j] + d[6 + j];
     double* step = &cameras_[kCameraRecord * i + camera_record::kStep];
-    const double all[9] = {d[3], d[4], d[5], d[0], d[1],
-                           d[2], d[6], k[1] * d[6] + k[0] * d[7], k[2] * d[6] + k[0] * d[8]};
+    const double all[9] = {d[3],
+                           d[4],
+                           d[5],
+                           d[0],
+                           d[1],
+                           d[2],
+                           d[6],
+                           k[1] * d[6] + k[0] * d[7],
+                           k[2] * d[6] + k[0] * d[8]};
     std::copy(all, all + 9, step);
     write_camera_record(i, trial_poses_[i], trial_lenses_[lens].data(), trial_cameras_.data());
     const auto norm = [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); };
@@ -169,8 +181,8 @@ Trial BundleSystem::trial() {
   Trial out;
   out.step_norm = step_cameras();
   const std::size_t slices = chunks_.slices.size() - 1;
-  const TrialInput in{&batches_,       cameras_.data(), trial_cameras_.data(), points_.data(),
-                      factors_.data(), watch_behind_};
+  const TrialInput in{&batches_,      cameras_.data(), trial_cameras_.data(),
+                      points_.data(), factors_.data(), watch_behind_};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};

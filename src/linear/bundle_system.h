@@ -61,9 +61,9 @@ class BundleSystem : public System {
   Buffer<double> cameras_, trial_cameras_;  ///< kCameraRecord per image
   Buffer<double> points_, trial_points_;    ///< kPointGroup per group
 
-  Buffer<double> factors_;              ///< kFactorGroup per group
-  Buffer<double> tiles_, diagonal_;     ///< one set per slice, the first ends up as the sum
-  std::vector<Buffer<double>> scratch_; ///< one per thread
+  Buffer<double> factors_;               ///< kFactorGroup per group
+  Buffer<double> tiles_, diagonal_;      ///< one set per slice, the first ends up as the sum
+  std::vector<Buffer<double>> scratch_;  ///< one per thread
   CameraVectors vectors_;
   Buffer<double> damping_, camera_step_;
   std::unique_ptr<DenseCameraSolver> dense_;

@@ -74,8 +74,8 @@ HWY_INLINE void solve_narrow(double* A, std::size_t lda, std::size_t k, std::siz
   }
 }
 
-void solve_rows(double* A, std::size_t lda, std::size_t k, std::size_t width,
-                const double* inverse, std::size_t first, std::size_t end) {
+void solve_rows(double* A, std::size_t lda, std::size_t k, std::size_t width, const double* inverse,
+                std::size_t first, std::size_t end) {
   for (std::size_t s = k; s < k + width; s += 8) {
     const std::size_t narrow = std::min<std::size_t>(8, k + width - s);
     solve_narrow(A, lda, s, narrow, inverse, first, end);
@@ -93,8 +93,7 @@ bool factor_narrow(double* A, std::size_t lda, std::size_t k, std::size_t width,
     A[j * lda + j] = root;
     for (std::size_t i = j + 1; i < k + width; ++i) A[j * lda + i] *= inverse[j];
     for (std::size_t c = j + 1; c < k + width; ++c)
-      for (std::size_t i = c; i < k + width; ++i)
-        A[c * lda + i] -= A[j * lda + i] * A[j * lda + c];
+      for (std::size_t i = c; i < k + width; ++i) A[c * lda + i] -= A[j * lda + i] * A[j * lda + c];
   }
   return true;
 }
@@ -203,8 +202,7 @@ bool DenseCholesky::factor(Threads& threads) {
     if (below >= n_) break;
     each((rows - below + kRows - 1) / kRows, [&](std::size_t b) {
       const std::size_t first = below + b * kRows;
-      kernels_.solve_rows(A, lda_, k, width, inverse_.data(), first,
-                          std::min(rows, first + kRows));
+      kernels_.solve_rows(A, lda_, k, width, inverse_.data(), first, std::min(rows, first + kRows));
     });
     // Column blocks of the trailing matrix, each in row blocks from its diagonal down.
     const std::size_t blocks = (n_ - below + kColumns - 1) / kColumns;

@@ -103,8 +103,7 @@ HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w
   const V h1 = hn::Mul(fnma(l10, h0, q1), i1);
 
   V fields[8], last[8];
-  for (int i = 0; i < 8; ++i)
-    fields[i] = fma(l00, j.camera[0][i], hn::Mul(l10, j.camera[1][i]));
+  for (int i = 0; i < 8; ++i) fields[i] = fma(l00, j.camera[0][i], hn::Mul(l10, j.camera[1][i]));
   store_records(fields, C, kCRecord);
   for (int i = 0; i < 8; ++i) fields[i] = hn::Mul(l11, j.camera[1][i]);
   store_records(fields, C + 8, kCRecord);
@@ -131,9 +130,9 @@ struct EliminateSums {
   V square[kParts], decrease[kParts], gradient2[kParts];
 };
 
-HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& group,
-                               std::size_t g, int part, double* jacobians, double* T, double* C,
-                               double* factors, EliminateSums& sums) {
+HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& group, std::size_t g,
+                               int part, double* jacobians, double* T, double* C, double* factors,
+                               EliminateSums& sums) {
   const Batches& batches = *in.batches;
   const int lane = part * kLanes;
   const double* X = in.points + kPointGroup * g + lane;
@@ -157,8 +156,8 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
 
   const V lambda = set(in.damping);
   V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
-  Factor f = factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12,
-                     hn::Add(p.v22, D2));
+  Factor f =
+      factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12, hn::Add(p.v22, D2));
   if (in.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
     f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
     D0 = D1 = D2 = zero();
@@ -191,17 +190,16 @@ HWY_INLINE double max_parts(const V* parts) {
   return most;
 }
 
-inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, double* jacobians,
-                            double* T, double* C, EliminateOutput& out) {
+inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, const Records& records,
+                            EliminateOutput& out) {
   EliminateSums sums;
-  for (int p = 0; p < kParts; ++p)
-    sums.square[p] = sums.decrease[p] = sums.gradient2[p] = zero();
+  for (int p = 0; p < kParts; ++p) sums.square[p] = sums.decrease[p] = sums.gradient2[p] = zero();
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     const Batches::Group group = in.batches->groups[g];
     const std::size_t record = 8 * (group.first_batch - chunk.first_batch);
     for (int p = 0; p < kParts; ++p)
-      eliminate_part(in, group, g, p, jacobians, T + kTRecord * record, C + kCRecord * record,
-                     out.factors, sums);
+      eliminate_part(in, group, g, p, records.jacobians, records.T + kTRecord * record,
+                     records.C + kCRecord * record, out.factors, sums);
   }
   out.square_sum += sum_parts(sums.square);
   out.point_decrease += sum_parts(sums.decrease);

@@ -19,14 +19,17 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-void eliminate(const EliminateInput& in, const Chunk& chunk, const SliceSums& sums,
-               Scratch scratch, EliminateOutput& out) {
-  double* T = scratch;
-  double* C = T + kTRecord * 8 * in.chunks->most_batches;
-  double* jacobians = C + kCRecord * 8 * in.chunks->most_batches;
-  linearize_chunk(in, chunk, jacobians, T, C, out);
-  diagonal_products(*in.chunks, chunk, T, C, sums.diagonal);
-  pair_products(*in.chunks, chunk, T, sums.tiles);
+void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
+               EliminateOutput& out) {
+  linearize_chunk(in, chunk, records, out);
+}
+
+void diagonal(const Chunks& chunks, const Chunk& chunk, const Records& records, double* sums) {
+  diagonal_products(chunks, chunk, records, sums);
+}
+
+void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, double* tiles) {
+  pair_products(chunks, chunk, records, tiles);
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
@@ -44,7 +47,7 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name, fused, &eliminate, &trial, &square_sum, &count_behind};
+  return {name, fused, &linearize, &diagonal, &pairs, &trial, &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -57,6 +60,11 @@ namespace sheaf {
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
   return (kTRecord + kCRecord) * 8 * chunks.most_batches +
          std::size_t(26 * 8) * batches.longest_track;
+}
+
+Records records_in(double* scratch, const Chunks& chunks) {
+  double* C = scratch + kTRecord * 8 * chunks.most_batches;
+  return {scratch, C, C + kCRecord * 8 * chunks.most_batches};
 }
 
 std::vector<const Kernels*> available_kernels() {
@@ -74,8 +82,8 @@ std::vector<const Kernels*> available_kernels() {
   static const Kernels sse4 = N_SSE4::table("sse4", false);
   if (supported & HWY_SSE4) out.push_back(&sse4);
 #endif
-  static const Kernels baseline = HWY_STATIC_DISPATCH(table)(
-      HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline", false);
+  static const Kernels baseline =
+      HWY_STATIC_DISPATCH(table)(HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline", false);
   out.push_back(&baseline);
   (void)supported;
   return out;

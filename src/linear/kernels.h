@@ -35,11 +35,6 @@ constexpr std::size_t kTileDoubles = 88;
 /// 8, 5 unused.
 constexpr std::size_t kDiagonalDoubles = 96;
 
-struct SliceSums {
-  double* tiles;     ///< kTileDoubles per tile
-  double* diagonal;  ///< kDiagonalDoubles per image
-};
-
 struct EliminateInput {
   const Batches* batches;
   const Chunks* chunks;
@@ -52,10 +47,10 @@ struct EliminateInput {
 constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
 
 struct EliminateOutput {
-  double* factors;       ///< kFactorGroup per group
-  double square_sum;     ///< sum |r|^2
-  double point_decrease; ///< sum |w|^2
-  double gradient_max2;  ///< largest |w|^2 of a point
+  double* factors;        ///< kFactorGroup per group
+  double square_sum;      ///< sum |r|^2
+  double point_decrease;  ///< sum |w|^2
+  double gradient_max2;   ///< largest |w|^2 of a point
 };
 
 struct TrialInput {
@@ -67,24 +62,36 @@ struct TrialInput {
   bool count_newly_behind;
 };
 struct TrialOutput {
-  double* points;            ///< stepped
-  double square_sum;         ///< sum |r|^2 at the stepped state
-  double damping_term;       ///< sum d^T D d over points
-  double step2_max;          ///< largest |d|^2 / |X|^2 of a point
+  double* points;              ///< stepped
+  double square_sum;           ///< sum |r|^2 at the stepped state
+  double damping_term;         ///< sum d^T D d over points
+  double step2_max;            ///< largest |d|^2 / |X|^2 of a point
   std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
 };
 
-/// Scratch of one thread, from Kernels::scratch_doubles.
-using Scratch = double*;
+/// Records of one chunk's elimination, in one thread's scratch. T: 32 doubles per record (three
+/// columns of W L^-T, rows 0..7 each; then row 8 of the three, 0, C row 8 (2), h (2)).
+/// C: 16 doubles per record. Jacobians: of one group at a time.
+struct Records {
+  double *T, *C, *jacobians;
+};
+constexpr std::size_t kTRecord = 32, kCRecord = 16;
+
+/// Doubles of scratch for any of these chunks, and the records laid out in it.
+std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
+Records records_in(double* scratch, const Chunks& chunks);
 
 /// One instruction set's hot kernels over one chunk. docs/math.md has the algebra.
 struct Kernels {
   const char* name;
   bool fused;  ///< uses fused multiply-add: agrees bit for bit with the others that do
 
-  /// Linearises and eliminates the chunk's points; adds to the slice's sums and to `out`.
-  void (*eliminate)(const EliminateInput&, const Chunk&, const SliceSums&, Scratch,
-                    EliminateOutput& out);
+  /// Linearises the chunk, factors its points' blocks and writes the records; adds to `out`.
+  void (*linearize)(const EliminateInput&, const Chunk&, const Records&, EliminateOutput& out);
+  /// Adds the records' products to the diagonal blocks and the right-hand side of a slice.
+  void (*diagonal)(const Chunks&, const Chunk&, const Records&, double* diagonal);
+  /// Adds the records' products to the off-diagonal blocks of a slice.
+  void (*pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
   /// Back-substitutes the chunk's points and evaluates the cost there; adds to `out`.
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
   /// Sum |r|^2 of the chunk.
@@ -93,12 +100,5 @@ struct Kernels {
   std::uint64_t (*count_behind)(const Batches&, const double* cameras, const double* points,
                                 const Chunk&);
 };
-
-/// Doubles of scratch that `eliminate` needs for any of these chunks.
-std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
-
-/// Records of the elimination in scratch: T, 32 doubles per record (three columns of L^-T W^T, rows
-/// 0..7 each; then row 8 of the three, 0, C row 8 (2), h (2)); C, 16 doubles per record.
-constexpr std::size_t kTRecord = 32, kCRecord = 16;
 
 }  // namespace sheaf

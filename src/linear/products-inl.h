@@ -68,14 +68,14 @@ HWY_INLINE void diagonal_corner(const std::uint16_t* records, std::uint32_t coun
   sums[88] += corner, sums[89] += rhs, sums[90] += squares;
 }
 
-inline void diagonal_products(const Chunks& chunks, const Chunk& chunk, const double* T,
-                              const double* C, double* sums) {
+inline void diagonal_products(const Chunks& chunks, const Chunk& chunk, const Records& from,
+                              double* sums) {
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun run = chunks.diagonal_runs[i];
     const std::uint16_t* records = &chunks.diagonal[run.first];
     double* to = sums + kDiagonalDoubles * run.image;
-    for (int p = 0; p < kParts; ++p) diagonal_part(records, run.count, p, T, C, to);
-    diagonal_corner(records, run.count, T, to);
+    for (int p = 0; p < kParts; ++p) diagonal_part(records, run.count, p, from.T, from.C, to);
+    diagonal_corner(records, run.count, from.T, to);
   }
 }
 
@@ -111,14 +111,14 @@ HWY_INLINE void pair_corner(const RecordPair* pairs, std::uint32_t count, const 
   tile[80] += corner;
 }
 
-inline void pair_products(const Chunks& chunks, const Chunk& chunk, const double* T,
+inline void pair_products(const Chunks& chunks, const Chunk& chunk, const Records& from,
                           double* tiles) {
   for (std::uint64_t i = chunk.first_pair_run; i < chunk.end_pair_run; ++i) {
     const PairRun run = chunks.pair_runs[i];
     const RecordPair* pairs = &chunks.pairs[run.first];
     double* tile = tiles + kTileDoubles * run.tile;
-    for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, T, tile);
-    pair_corner(pairs, run.count, T, tile);
+    for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, from.T, tile);
+    pair_corner(pairs, run.count, from.T, tile);
   }
 }
 

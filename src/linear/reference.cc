@@ -139,7 +139,9 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
 }
 
 /// Entry k of the three columns of T, and of the two rows of C: 8 + 1 storage undone.
-double t_entry(const double* T, int column, int k) { return k < 8 ? T[8 * column + k] : T[24 + column]; }
+double t_entry(const double* T, int column, int k) {
+  return k < 8 ? T[8 * column + k] : T[24 + column];
+}
 double c_entry(const double* T, const double* C, int row, int k) {
   return k < 8 ? C[8 * row + k] : T[28 + row];
 }
@@ -147,8 +149,8 @@ double c_entry(const double* T, const double* C, int row, int k) {
 void add_diagonal(const double* T, const double* C, double* to) {
   for (int i = 0; i < 9; ++i) {
     for (int k = 0; k < 9; ++k) {
-      const double s = c_entry(T, C, 0, i) * c_entry(T, C, 0, k) +
-                       c_entry(T, C, 1, i) * c_entry(T, C, 1, k);
+      const double s =
+          c_entry(T, C, 0, i) * c_entry(T, C, 0, k) + c_entry(T, C, 1, i) * c_entry(T, C, 1, k);
       if (k < 8) to[8 * i + k] += s;
       if (k == 8 && i == 8) to[88] += s;
     }
@@ -169,26 +171,30 @@ void add_pair(const double* Ta, const double* Tb, double* tile) {
     }
 }
 
-void eliminate(const EliminateInput& in, const Chunk& chunk, const SliceSums& sums,
-               Scratch scratch, EliminateOutput& out) {
-  double* T = scratch;
-  double* C = T + kTRecord * 8 * in.chunks->most_batches;
+void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
+               EliminateOutput& out) {
   for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
     for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l)
-      eliminate_point(in, chunk, g, l, T, C, out);
+      eliminate_point(in, chunk, g, l, records.T, records.C, out);
+}
+
+void diagonal(const Chunks& chunks, const Chunk& chunk, const Records& records, double* sums) {
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
-    const DiagonalRun& run = in.chunks->diagonal_runs[i];
+    const DiagonalRun& run = chunks.diagonal_runs[i];
     for (std::uint64_t r = run.first; r < run.first + run.count; ++r) {
-      const std::size_t record = in.chunks->diagonal[r];
-      add_diagonal(T + kTRecord * record, C + kCRecord * record,
-                   sums.diagonal + kDiagonalDoubles * run.image);
+      const std::size_t record = chunks.diagonal[r];
+      add_diagonal(records.T + kTRecord * record, records.C + kCRecord * record,
+                   sums + kDiagonalDoubles * run.image);
     }
   }
+}
+
+void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, double* tiles) {
   for (std::uint64_t i = chunk.first_pair_run; i < chunk.end_pair_run; ++i) {
-    const PairRun& run = in.chunks->pair_runs[i];
+    const PairRun& run = chunks.pair_runs[i];
     for (std::uint64_t r = run.first; r < run.first + run.count; ++r)
-      add_pair(T + kTRecord * in.chunks->pairs[r].a, T + kTRecord * in.chunks->pairs[r].b,
-               sums.tiles + kTileDoubles * run.tile);
+      add_pair(records.T + kTRecord * chunks.pairs[r].a, records.T + kTRecord * chunks.pairs[r].b,
+               tiles + kTileDoubles * run.tile);
   }
 }
 
@@ -196,8 +202,15 @@ void eliminate(const EliminateInput& in, const Chunk& chunk, const SliceSums& su
 std::array<double, 2> camera_motion(const Row& row, const double* record) {
   const double* s = record + camera_record::kStep;
   const double f = record[12];
-  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6],
-                                 (s[7] - record[13] * s[6]) / f, (s[8] - record[14] * s[6]) / f};
+  const std::array<double, 9> dc{s[3],
+                                 s[4],
+                                 s[5],
+                                 s[0],
+                                 s[1],
+                                 s[2],
+                                 s[6],
+                                 (s[7] - record[13] * s[6]) / f,
+                                 (s[8] - record[14] * s[6]) / f};
   std::array<double, 2> e{};
   for (int r = 0; r < 2; ++r)
     for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];
@@ -231,8 +244,7 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     const Row row = row_of(batches, in.cameras, X, b, lane);
-    const auto e =
-        camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
+    const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
     for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
   }
   const double* factor = in.factors + kFactorGroup * g + lane;
@@ -269,8 +281,8 @@ double square_sum(const Batches& batches, const double* cameras, const double* p
   for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
     for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l)
       for (std::uint32_t o = 0; o < batches.groups[g].track; ++o) {
-        const Row row = row_of(batches, cameras, point_of(points, g, l),
-                               batches.groups[g].first_batch + o, l);
+        const Row row =
+            row_of(batches, cameras, point_of(points, g, l), batches.groups[g].first_batch + o, l);
         sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
       }
   return sum;
@@ -290,7 +302,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false, &eliminate, &trial, &square_sum, &count_behind};
+  static const Kernels kernels{"reference", false,  &linearize,  &diagonal,
+                               &pairs,      &trial, &square_sum, &count_behind};
   return kernels;
 }
 

@@ -35,8 +35,7 @@ HWY_INLINE void add_coupled(const V* c, const Seen& seen, V* s) {
   const V h0 = hn::Mul(seen.iz, fma(fd, e0, hn::Mul(t, seen.x)));
   const V h1 = hn::Mul(seen.iz, fma(fd, e1, hn::Mul(t, seen.y)));
   const V h2 = fma(seen.x, h0, hn::Mul(seen.y, h1));
-  for (int i = 0; i < 3; ++i)
-    s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
+  for (int i = 0; i < 3; ++i) s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
 }
 
 struct TrialSums {
@@ -51,7 +50,8 @@ HWY_INLINE V squared_residual(const V* c, const Seen& s, V zx, V zy) {
 
 /// d = L^-T (w - L^-1 s); returns d^T D d.
 HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
-  const Factor f{load(pd), load(pd + 8), load(pd + 16), load(pd + 24), load(pd + 32), load(pd + 40)};
+  const Factor f{load(pd),      load(pd + 8),  load(pd + 16),
+                 load(pd + 24), load(pd + 32), load(pd + 40)};
   V u[3];
   forward(f, s, u);
   for (int i = 0; i < 3; ++i) u[i] = hn::Sub(load(pd + 8 * (6 + i)), u[i]);
@@ -59,8 +59,7 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   d[1] = hn::Mul(fnma(f.l21, d[2], u[1]), f.i11);
   d[0] = hn::Mul(fnma(f.l20, d[2], fnma(f.l10, d[1], u[0])), f.i00);
   V sum = zero();
-  for (int i = 0; i < 3; ++i)
-    sum = fma(hn::Mul(d[i], d[i]), load(pd + 8 * (9 + i)), sum);
+  for (int i = 0; i < 3; ++i) sum = fma(hn::Mul(d[i], d[i]), load(pd + 8 * (9 + i)), sum);
   return sum;
 }
 
@@ -116,8 +115,7 @@ inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& o
   for (int p = 0; p < kParts; ++p)
     sums.square[p] = sums.damping[p] = sums.step2[p] = sums.behind[p] = zero();
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
-    for (int p = 0; p < kParts; ++p)
-      trial_part(in, in.batches->groups[g], g, p, out.points, sums);
+    for (int p = 0; p < kParts; ++p) trial_part(in, in.batches->groups[g], g, p, out.points, sums);
   out.square_sum += sum_parts(sums.square);
   out.damping_term += sum_parts(sums.damping);
   const double step2 = max_parts(sums.step2);

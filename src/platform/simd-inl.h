@@ -41,8 +41,7 @@ HWY_INLINE V fnma(V a, V b, V c) { return hn::NegMulAdd(a, b, c); }
 template <int K>
 HWY_INLINE V broadcast(const double* record, [[maybe_unused]] V loaded) {
 #if HWY_TARGET <= HWY_AVX3
-  if constexpr (K % 2 == 1)
-    return V{_mm512_permutexvar_pd(_mm512_set1_epi64(K), loaded.raw)};
+  if constexpr (K % 2 == 1) return V{_mm512_permutexvar_pd(_mm512_set1_epi64(K), loaded.raw)};
 #endif
   return set(record[K]);
 }
@@ -127,8 +126,7 @@ HWY_INLINE void load_records(const double* base, std::size_t stride, const std::
 HWY_INLINE void broadcast_record(const double* record, V* fields) {
 #if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
   const V whole = load(record);
-  for (int i = 0; i < 8; ++i)
-    fields[i] = V{_mm512_permutexvar_pd(_mm512_set1_epi64(i), whole.raw)};
+  for (int i = 0; i < 8; ++i) fields[i] = V{_mm512_permutexvar_pd(_mm512_set1_epi64(i), whole.raw)};
 #else
   for (int i = 0; i < 8; ++i) fields[i] = set(record[i]);
 #endif

@@ -77,7 +77,8 @@ Buffer<KeyedPoint> order_points(const Problem& p, const ByPoint& by_point) {
   constexpr int kLengthBits = 20;
   const int leading = std::max(1, (64 - kLengthBits) / bits);
   std::size_t seen = 0;
-  for (std::size_t j = 0; j < p.num_points(); ++j) seen += by_point.first[j + 1] > by_point.first[j];
+  for (std::size_t j = 0; j < p.num_points(); ++j)
+    seen += by_point.first[j + 1] > by_point.first[j];
   Buffer<KeyedPoint> items(seen);
   seen = 0;
   for (std::size_t j = 0; j < p.num_points(); ++j) {

@@ -47,10 +47,10 @@ Result<void> validate_sizes(const Problem& p) {
   if (p.points.size() % 3 != 0) return invalid("points does not hold three numbers for each point");
   if (p.observation_point.size() != p.num_observations() ||
       p.observation_xy.size() != 2 * p.num_observations())
-    return invalid("observation arrays disagree in length: " +
-                   std::to_string(p.observation_image.size()) + " images, " +
-                   std::to_string(p.observation_point.size()) + " points, " +
-                   std::to_string(p.observation_xy.size()) + " coordinates");
+    return invalid(
+        "observation arrays disagree in length: " + std::to_string(p.observation_image.size()) +
+        " images, " + std::to_string(p.observation_point.size()) + " points, " +
+        std::to_string(p.observation_xy.size()) + " coordinates");
   if (!p.bal_angle_axis.empty() && p.bal_angle_axis.size() != 3 * p.num_images())
     return invalid("bal_angle_axis must be empty or hold three numbers for each image");
   if (p.num_images() >= UINT32_MAX || p.num_points() >= UINT32_MAX)
@@ -68,7 +68,8 @@ Result<void> validate_images(const Problem& p) {
     if (!(std::abs(norm2 - 1) < 1e-6))
       return invalid(numbered("pose", i) + ": the rotation is not a unit quaternion");
     for (double t : p.poses[i].translation)
-      if (!std::isfinite(t)) return invalid(numbered("pose", i) + ": the translation is not finite");
+      if (!std::isfinite(t))
+        return invalid(numbered("pose", i) + ": the translation is not finite");
   }
   for (std::size_t i = 0; i < p.cameras.size(); ++i)
     for (double k : p.cameras[i].parameters)

@@ -16,11 +16,16 @@ namespace {
 
 const char* simd_name(Simd simd) {
   switch (simd) {
-    case Simd::scalar: return "scalar";
-    case Simd::sse4: return "sse4";
-    case Simd::avx2: return "avx2";
-    case Simd::avx512: return "avx512";
-    case Simd::best: break;
+    case Simd::scalar:
+      return "scalar";
+    case Simd::sse4:
+      return "sse4";
+    case Simd::avx2:
+      return "avx2";
+    case Simd::avx512:
+      return "avx512";
+    case Simd::best:
+      break;
   }
   return "";
 }
@@ -118,13 +123,20 @@ Summary solve(Problem& problem, const SolveOptions& options) {
 
 const char* to_string(Termination termination) {
   switch (termination) {
-    case Termination::cost_converged: return "cost_converged";
-    case Termination::gradient_converged: return "gradient_converged";
-    case Termination::step_converged: return "step_converged";
-    case Termination::max_iterations: return "max_iterations";
-    case Termination::time_limit: return "time_limit";
-    case Termination::stopped: return "stopped";
-    case Termination::no_usable_step: return "no_usable_step";
+    case Termination::cost_converged:
+      return "cost_converged";
+    case Termination::gradient_converged:
+      return "gradient_converged";
+    case Termination::step_converged:
+      return "step_converged";
+    case Termination::max_iterations:
+      return "max_iterations";
+    case Termination::time_limit:
+      return "time_limit";
+    case Termination::stopped:
+      return "stopped";
+    case Termination::no_usable_step:
+      return "no_usable_step";
   }
   return "no_usable_step";
 }

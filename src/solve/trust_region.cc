@@ -132,8 +132,7 @@ class Loop {
   bool gradient_vanished(const Step& step) {
     // |J_i^T r| / |J_i| is at most |r|: the ratio is the cosine between residual and column.
     if (!(step.gradient_max <= options_.gradient_tolerance * std::sqrt(2 * cost_))) return false;
-    end(Termination::gradient_converged,
-        "converged: the scaled gradient is below its tolerance");
+    end(Termination::gradient_converged, "converged: the scaled gradient is below its tolerance");
     return true;
   }
 

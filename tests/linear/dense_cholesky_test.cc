@@ -51,8 +51,7 @@ TEST(DenseCholesky, SolvesOnEveryInstructionSetAndSize) {
       double worst = 0;
       for (std::size_t i = 0; i < n; ++i) {
         double r = -std::sin(double(i));
-        for (std::size_t j = 0; j < n; ++j)
-          r += (j <= i ? A[i * n + j] : A[j * n + i]) * x[j];
+        for (std::size_t j = 0; j < n; ++j) r += (j <= i ? A[i * n + j] : A[j * n + i]) * x[j];
         worst = std::max(worst, std::abs(r));
       }
       EXPECT_LT(worst, 1e-10);

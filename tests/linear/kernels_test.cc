@@ -80,9 +80,12 @@ class KernelsTest : public ::testing::Test {
     const EliminateInput in{&batches_,      &chunks_, cameras_.data(),
                             points_.data(), 1e-3,     points_held_};
     out.eliminated.factors = out.factors.data();
-    for (const Chunk& chunk : chunks_.chunks)
-      kernels.eliminate(in, chunk, {out.tiles.data(), out.diagonal.data()}, scratch.data(),
-                        out.eliminated);
+    const Records records = records_in(scratch.data(), chunks_);
+    for (const Chunk& chunk : chunks_.chunks) {
+      kernels.linearize(in, chunk, records, out.eliminated);
+      kernels.diagonal(chunks_, chunk, records, out.diagonal.data());
+      kernels.pairs(chunks_, chunk, records, out.tiles.data());
+    }
     const TrialInput trial{&batches_,      cameras_.data(),    trial_cameras_.data(),
                            points_.data(), out.factors.data(), true};
     out.trial.points = out.trial_points.data();
