@@ -22,7 +22,7 @@ peers=$build/peers
 plots=docs/bench
 mkdir -p "$peers"
 
-build_peer() { # NAME SOURCE-OPTION CMAKE-ARGUMENTS...
+build_peer() { # NAME PROGRAM CMAKE-ARGUMENTS...
   local name=$1 program=$2
   shift 2
   cmake -S "$root/bench/peers" -B "$build/adapter-$name" -DCMAKE_BUILD_TYPE=Release \
@@ -49,7 +49,10 @@ if [ -L "$peers/peer-ceres-system" ]; then # named by its version, 2.1 and not 2
   version=$(sed -n 's/^-- Ceres \([0-9]*\.[0-9]*\).*/\1/p' "$build/adapter-ceres-system.log")
   mv "$peers/peer-ceres-system" "$peers/peer-ceres-$version"
 fi
-build_peer g2o peer-g2o -DSHEAF_PEER_CERES=OFF
+build_peer g2o-system peer-g2o -DSHEAF_PEER_CERES=OFF
+if [ -L "$peers/peer-g2o-system" ]; then
+  mv "$peers/peer-g2o-system" "$peers/peer-g2o"
+fi
 for entry in ${SHEAF_PEERS:-}; do
   name=${entry%%=*}
   case $name in
