@@ -27,8 +27,18 @@ struct Arguments {
   std::string in, out, ply;
 };
 
-// The best state found; what could not be improved is not written again.
-std::vector<std::string> write_results(const Arguments& arguments, const Problem& before,
+// All but the observations, which are most of the memory while the solver needs its own.
+Problem state_of(const Problem& problem) {
+  Problem state;
+  state.poses = problem.poses;
+  state.image_camera = problem.image_camera;
+  state.cameras = problem.cameras;
+  state.points = problem.points;
+  return state;
+}
+
+// The best state found, and what was written.
+std::vector<std::string> write_results(const Arguments& arguments, Problem before,
                                        const Problem& after) {
   std::vector<std::string> written;
   if (!arguments.out.empty()) {
@@ -36,6 +46,9 @@ std::vector<std::string> write_results(const Arguments& arguments, const Problem
     written.push_back(arguments.out);
   }
   if (!arguments.ply.empty()) {
+    before.observation_image = after.observation_image;
+    before.observation_point = after.observation_point;
+    before.observation_xy = after.observation_xy;
     write_ply(before, after, arguments.ply).value();
     written.push_back(arguments.ply);
   }
@@ -58,8 +71,7 @@ int run(const Arguments& arguments) {
     record.input = input_json(arguments.in, input);
     record.before = evaluate(problem);
   }
-  Problem before;
-  if (!arguments.ply.empty()) before = problem;
+  Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
 
   Progress progress(arguments.common.quiet);
   SolveOptions options = solve_options(arguments.solve);
@@ -75,7 +87,7 @@ int run(const Arguments& arguments) {
 
   const Timer writing;
   std::vector<std::string> written;
-  if (summary.usable()) written = write_results(arguments, before, problem);
+  if (summary.usable()) written = write_results(arguments, std::move(before), problem);
   record.write_s = writing.seconds();
   fmt::print("{}: {}\n", arguments.in, counts_text(problem));
   fmt::print("{}", summary_text(summary, input.read_s));
