@@ -13,6 +13,7 @@
 
 #include "linear/eliminate-inl.h"
 #include "linear/products-inl.h"
+#include "linear/schur_product-inl.h"
 #include "linear/trial-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -36,6 +37,10 @@ void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
   trial_chunk(in, chunk, out);
 }
 
+void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {
+  product_chunk(in, chunk, saved, y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   return square_sum_chunk(batches, cameras, points, chunk);
@@ -47,7 +52,7 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name, fused, &linearize, &diagonal, &pairs, &trial, &square_sum, &count_behind};
+  return {name, fused, &linearize, &diagonal, &pairs, &trial, &product, &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -60,6 +65,10 @@ namespace sheaf {
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
   return (kTRecord + kCRecord) * 8 * chunks.most_batches +
          std::size_t(26 * 8) * batches.longest_track;
+}
+
+std::size_t product_scratch_doubles(const Batches& batches) {
+  return std::size_t(20 * 8) * batches.longest_track;
 }
 
 Records records_in(double* scratch, const Chunks& chunks) {

@@ -69,6 +69,17 @@ struct TrialOutput {
   std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
 };
 
+/// x is the step in the camera records.
+struct ProductInput {
+  const Batches* batches;
+  const double* cameras;  ///< held state, with x as the step
+  const double* points;
+  const double* factors;
+};
+/// Per image: rho (3), phi (3), then sums of s, s n and s n^2 (s = p . e), 7 unused:
+///   y_f = s0 + k1 s1 + k2 s2, y_k1 = f s1, y_k2 = f s2.
+constexpr std::size_t kProductRecord = 16;
+
 /// Records of one chunk's elimination, in one thread's scratch. T: 32 doubles per record (three
 /// columns of W L^-T, rows 0..7 each; then row 8 of the three, 0, C row 8 (2), h (2)).
 /// C: 16 doubles per record. Jacobians: of one group at a time.
@@ -80,6 +91,8 @@ constexpr std::size_t kTRecord = 32, kCRecord = 16;
 /// Doubles of scratch for any of these chunks, and the records laid out in it.
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
 Records records_in(double* scratch, const Chunks& chunks);
+/// Doubles of `saved` that a product needs.
+std::size_t product_scratch_doubles(const Batches& batches);
 
 /// One instruction set's hot kernels over one chunk. docs/math.md has the algebra.
 struct Kernels {
@@ -94,6 +107,8 @@ struct Kernels {
   void (*pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
   /// Back-substitutes the chunk's points and evaluates the cost there; adds to `out`.
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
+  /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, kProductRecord doubles per image.
+  void (*product)(const ProductInput&, const Chunk&, double* saved, double* y);
   /// Sum |r|^2 of the chunk.
   double (*square_sum)(const Batches&, const double* cameras, const double* points, const Chunk&);
   /// Observations of the chunk whose point lies behind its camera (P.z > 0).

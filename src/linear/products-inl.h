@@ -30,8 +30,6 @@ HWY_INLINE void outer8(const double* x, V loaded, V v, V* a) {
   a[7] = fma(broadcast<7>(x, loaded), v, a[7]);
 }
 
-HWY_INLINE void add_to(V v, double* p) { store(hn::Add(load(p), v), p); }
-
 /// Columns [8 part / kParts, ...) of one image's diagonal block, and its right-hand side.
 HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count, int part,
                               const double* T, const double* C, double* sums) {

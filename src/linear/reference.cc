@@ -275,6 +275,42 @@ void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
     for (std::uint32_t l = 0; l < 8; ++l) trial_point(in, g, l, out);
 }
 
+void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, double* y) {
+  const Batches& batches = *in.batches;
+  const Batches::Group& group = batches.groups[g];
+  const Vector3<double> X = point_of(in.points, g, lane);
+  const double* factor = in.factors + kFactorGroup * g + lane;
+  Vector3<double> s{};
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t b = group.first_batch + o;
+    const Row row = row_of(batches, in.cameras, X, b, lane);
+    const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
+    for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
+  }
+  // back_substitute gives L^-T (w - L^-1 s): taken from that of s = 0, (V + D)^-1 s is left.
+  const Vector3<double> with = back_substitute(factor, s), without = back_substitute(factor, {});
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t b = group.first_batch + o;
+    const std::uint32_t image = batches.image[8 * b + lane];
+    const double* record = in.cameras + kCameraRecord * image;
+    const Row row = row_of(batches, in.cameras, X, b, lane);
+    auto e = camera_motion(row, record);
+    for (int r = 0; r < 2; ++r)
+      for (int i = 0; i < 3; ++i) e[r] -= row.j.point[3 * r + i] * (without[i] - with[i]);
+    std::array<double, 9> v{};
+    for (int r = 0; r < 2; ++r)
+      for (int k = 0; k < 9; ++k) v[k] += row.j.camera[9 * r + k] * e[r];
+    v[7] /= record[12], v[8] /= record[12];  // to the sums s n, s n^2, and s from y_f
+    v[6] -= record[13] * v[7] + record[14] * v[8];
+    for (int k = 0; k < 9; ++k) y[kProductRecord * image + k] += v[k];
+  }
+}
+
+void product(const ProductInput& in, const Chunk& chunk, double*, double* y) {
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l) product_point(in, g, l, y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   double sum = 0;
@@ -302,8 +338,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false,  &linearize,  &diagonal,
-                               &pairs,      &trial, &square_sum, &count_behind};
+  static const Kernels kernels{"reference", false,    &linearize,  &diagonal,    &pairs,
+                               &trial,      &product, &square_sum, &count_behind};
   return kernels;
 }
 

@@ -16,10 +16,8 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// s += Jp^T Jc dc of one observation per lane; c holds the 24 fields of camera and step.
-HWY_INLINE void add_coupled(const V* c, const Seen& seen, V* s) {
-  const V fd = hn::Mul(c[12], distortion(c, seen.n));
-  const V dd = distortion_slope(c, seen.n);
+/// e = Jc dc of one observation per lane; c holds the 24 fields of camera and step.
+HWY_INLINE void camera_motion(const V* c, const Seen& seen, V fd, V dd, V& e0, V& e1) {
   // dP = phi x P + rho; d p = iz (dP.xy + p dP.z)
   const V m0 = fma(c[16], seen.P2, fnma(c[17], seen.P1, c[18]));
   const V m1 = fma(c[17], seen.P0, fnma(c[15], seen.P2, c[19]));
@@ -28,14 +26,26 @@ HWY_INLINE void add_coupled(const V* c, const Seen& seen, V* s) {
   const V dy = hn::Mul(seen.iz, fma(seen.y, m2, m1));
   const V intrinsic = fma(seen.n, fma(seen.n, c[23], c[22]), c[21]);
   const V along = fma(dd, fma(seen.x, dx, hn::Mul(seen.y, dy)), intrinsic);
-  const V e0 = fma(fd, dx, hn::Mul(along, seen.x));
-  const V e1 = fma(fd, dy, hn::Mul(along, seen.y));
-  // A^T e with A = iz (fd I + dd p p^T) [I | p], then R^T.
+  e0 = fma(fd, dx, hn::Mul(along, seen.x));
+  e1 = fma(fd, dy, hn::Mul(along, seen.y));
+}
+
+/// s += Jp^T e: A^T e with A = iz (fd I + dd p p^T) [I | p], then R^T.
+HWY_INLINE void add_to_point(const V* c, const Seen& seen, V fd, V dd, V e0, V e1, V* s) {
   const V t = hn::Mul(dd, fma(seen.x, e0, hn::Mul(seen.y, e1)));
   const V h0 = hn::Mul(seen.iz, fma(fd, e0, hn::Mul(t, seen.x)));
   const V h1 = hn::Mul(seen.iz, fma(fd, e1, hn::Mul(t, seen.y)));
   const V h2 = fma(seen.x, h0, hn::Mul(seen.y, h1));
   for (int i = 0; i < 3; ++i) s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
+}
+
+/// s += Jp^T Jc dc of one observation per lane.
+HWY_INLINE void add_coupled(const V* c, const Seen& seen, V* s) {
+  const V fd = hn::Mul(c[12], distortion(c, seen.n));
+  const V dd = distortion_slope(c, seen.n);
+  V e0, e1;
+  camera_motion(c, seen, fd, dd, e0, e1);
+  add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
 struct TrialSums {
@@ -48,16 +58,32 @@ HWY_INLINE V squared_residual(const V* c, const Seen& s, V zx, V zy) {
   return fma(r0, r0, hn::Mul(r1, r1));
 }
 
-/// d = L^-T (w - L^-1 s); returns d^T D d.
-HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
-  const Factor f{load(pd),      load(pd + 8),  load(pd + 16),
-                 load(pd + 24), load(pd + 32), load(pd + 40)};
-  V u[3];
-  forward(f, s, u);
-  for (int i = 0; i < 3; ++i) u[i] = hn::Sub(load(pd + 8 * (6 + i)), u[i]);
+HWY_INLINE Factor load_factor(const double* pd) {
+  return {load(pd), load(pd + 8), load(pd + 16), load(pd + 24), load(pd + 32), load(pd + 40)};
+}
+
+/// L^-T u.
+HWY_INLINE void backward(const Factor& f, const V* u, V* d) {
   d[2] = hn::Mul(u[2], f.i22);
   d[1] = hn::Mul(fnma(f.l21, d[2], u[1]), f.i11);
   d[0] = hn::Mul(fnma(f.l20, d[2], fnma(f.l10, d[1], u[0])), f.i00);
+}
+
+/// u = (V + D)^-1 s.
+HWY_INLINE void solve_point(const double* pd, const V* s, V* u) {
+  const Factor f = load_factor(pd);
+  V y[3];
+  forward(f, s, y);
+  backward(f, y, u);
+}
+
+/// d = L^-T (w - L^-1 s); returns d^T D d.
+HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
+  const Factor f = load_factor(pd);
+  V u[3];
+  forward(f, s, u);
+  for (int i = 0; i < 3; ++i) u[i] = hn::Sub(load(pd + 8 * (6 + i)), u[i]);
+  backward(f, u, d);
   V sum = zero();
   for (int i = 0; i < 3; ++i) sum = fma(hn::Mul(d[i], d[i]), load(pd + 8 * (9 + i)), sum);
   return sum;

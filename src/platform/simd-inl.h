@@ -132,6 +132,8 @@ HWY_INLINE void broadcast_record(const double* record, V* fields) {
 #endif
 }
 
+HWY_INLINE void add_to(V v, double* p) { store(hn::Add(load(p), v), p); }
+
 /// Sum of eight lanes in a fixed tree.
 HWY_INLINE double sum8(const double* lanes) {
   return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +

@@ -17,7 +17,7 @@ namespace {
 
 /// Everything that the kernels produce from one state.
 struct Outcome {
-  Buffer<double> tiles, diagonal, factors, trial_points;
+  Buffer<double> tiles, diagonal, factors, trial_points, product;
   EliminateOutput eliminated{};
   TrialOutput trial{};
   double square_sum = 0;
@@ -89,7 +89,12 @@ class KernelsTest : public ::testing::Test {
     const TrialInput trial{&batches_,      cameras_.data(),    trial_cameras_.data(),
                            points_.data(), out.factors.data(), true};
     out.trial.points = out.trial_points.data();
+    out.product.allocate(kProductRecord * 9);
+    out.product.fill(0);
+    Buffer<double> saved(product_scratch_doubles(batches_));
+    const ProductInput product{&batches_, cameras_.data(), points_.data(), out.factors.data()};
     for (const Chunk& chunk : chunks_.chunks) {
+      kernels.product(product, chunk, saved.data(), out.product.data());
       kernels.trial(trial, chunk, out.trial);
       out.square_sum += kernels.square_sum(batches_, cameras_.data(), points_.data(), chunk);
       out.behind += kernels.count_behind(batches_, cameras_.data(), points_.data(), chunk);
@@ -135,6 +140,7 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
       expect_close(got.tiles, expected.tiles, 1e-9, "tile");
       expect_close(got.diagonal, expected.diagonal, 1e-8, "diagonal");
       expect_close(got.factors, expected.factors, 1e-9, "factor");
+      expect_close(got.product, expected.product, 1e-7, "product");
       expect_close(got.trial_points, expected.trial_points, 1e-11, "trial point");
       const auto near = [](double a, double b) { EXPECT_NEAR(a, b, 1e-10 * std::abs(b)); };
       near(got.eliminated.square_sum, expected.eliminated.square_sum);
@@ -168,6 +174,7 @@ TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
     EXPECT_TRUE(same(first.diagonal, other.diagonal));
     EXPECT_TRUE(same(first.factors, other.factors));
     EXPECT_TRUE(same(first.trial_points, other.trial_points));
+    EXPECT_TRUE(same(first.product, other.product));
     EXPECT_EQ(first.trial.square_sum, other.trial.square_sum);
     EXPECT_EQ(first.eliminated.square_sum, other.eliminated.square_sum);
   }
