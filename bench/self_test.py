@@ -105,7 +105,13 @@ def check_pages():
     assert "| tiny | 1 | 0.400 | 6.00 | **15.0** |" in table, table
     assert write_pages.between("a<!-- bench:begin -->old<!-- bench:end -->b", "new") == (
         "a<!-- bench:begin -->\nnew<!-- bench:end -->b")
-    assert "a cpu" in write_pages.page(results, "plots")
+    kernels = {"benchmarks": [{"name": "avx2/trial", "real_time": 4.0, "cpu_time": 2.0,
+                               "time_unit": "ms", "Gflop/s": 30e9, "of peak": 0.25,
+                               "flops/obs": 60.0, "bytes/obs": 20.0}]}
+    results["machine"]["triad_gbytes_s"] = {"one": 20.0, "all": 20.0}
+    text = write_pages.page(results, "plots", kernels)
+    assert "a cpu" in text and "Not on this machine: g2o-omp." in text
+    assert "| avx2/trial | 2.000 | 60 | 30.0 | 25 % | 20 | 10.0 | 50 % |" in text
 
 
 def run():
