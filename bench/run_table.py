@@ -34,12 +34,14 @@ def summary_row(name, config, group, optimum):
         row["message"] = group[0]["failed"]
         return row
     row["solver"] = good[0]["solver"]
+    row["agrees"] = all(r["agrees"] for r in good)
     row["time_to"] = {}
     for tau in TAUS:
-        times = [time_to(r["trace"], optimum * (1 + tau)) for r in good]
+        # A trace that ends at another cost than the state has counts something else: no time.
+        times = [time_to(r["trace"], optimum * (1 + tau)) if r["agrees"] else math.inf
+                 for r in good]
         row["time_to"][f"{tau:g}"] = finite(statistics.median(times))
-    last = [t for t in (time_to(r["trace"], optimum * (1 + TAUS[-1])) for r in good)
-            if math.isfinite(t)]
+    last = [t for t in times if math.isfinite(t)]
     row["spread"] = (max(last) - min(last)) / statistics.median(last) if last else None
     for key in ("seconds_per_iteration", "setup_s", "total_s", "cpu_percent", "peak_bytes",
                 "iterations", "final_cost_independent"):
@@ -73,7 +75,7 @@ def markdown(rows):
         cells = [row["name"], row["config"]] + [seconds(row["time_to"][f"{t:g}"]) for t in TAUS]
         cells += [seconds(row["seconds_per_iteration"]), f"{row['iterations']:.0f}",
                   f"{row['peak_bytes'] / 1e6:.0f}", f"{row['cpu_percent']:.0f}",
-                  f"{row['final_cost_independent']:.4f}",
+                  f"{row['final_cost_independent']:.4f}" + ("" if row["agrees"] else " †"),
                   "" if row["spread"] is None else f"{100 * row['spread']:.0f} %"]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

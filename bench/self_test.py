@@ -32,7 +32,7 @@ def canned_run(name, trace, final, **more):
     return {"name": name, "config": "x", "solver": name, "threads": 1, "trace": trace,
             "seconds_per_iteration": 0.1, "setup_s": 0.1, "total_s": trace[-1][0],
             "cpu_percent": 100, "peak_bytes": 1e6, "iterations": len(trace) - 1,
-            "final_cost_independent": final, **more}
+            "final_cost_independent": final, "agrees": True, **more}
 
 
 def canned_document():
@@ -71,6 +71,8 @@ def check_table():
     assert rows["ceres-head"]["time_to"]["0.1"] == 4.0
     assert rows["ceres-head"]["time_to"]["0.01"] == 6.0
     assert rows["g2o"]["time_to"]["0.1"] is None
+    liar = run_table.summary_row("x", "y", [canned_run("x", [[1, 1.0]], 200.0, agrees=False)], 100)
+    assert liar["time_to"]["0.1"] is None and "200.0000 †" in run_table.markdown([liar])
     text = run_table.markdown(document["summary"])
     assert "| g2o | x | miss | miss | miss | miss | miss |" in text and "failed" in text
     order = [line.split("|")[1].strip() for line in text.splitlines()[2:]]

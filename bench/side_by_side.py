@@ -139,7 +139,8 @@ def median_run(runs, row):
 def curves(document):
     """Each solver's quickest configuration, sheaf first; labels and traces."""
     chosen = {}
-    for row in sorted((r for r in document["summary"] if r["runs"]), key=run_table.speed):
+    comparable = [r for r in document["summary"] if r["runs"] and r["agrees"]]
+    for row in sorted(comparable, key=run_table.speed):
         chosen.setdefault(row["name"], row)
     rows = sorted(chosen.values(), key=lambda r: (r["name"] != "sheaf", run_table.speed(r)))
     return [(row["name"] if row["name"] == "sheaf" else f"{row['name']} {row['config']}",

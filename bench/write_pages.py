@@ -99,7 +99,9 @@ def page(results, plots, kernels=None):
            "interleaved runs in fresh processes. Times are seconds until the cost is at or below "
            "f* (1 + tau), f* the best cost anyone found, set-up included, reading left out; "
            "\"miss\": never. Cost is 1/2 sum |r|^2, 9-parameter cameras, no loss. \"Final cost\" is "
-           "evaluated by code apart from all solvers. \"Spread\" is (max - min) / median of the "
+           "evaluated by code apart from all solvers; † marks a solver whose own figure differs (one "
+           "that leaves observations out, say): its trace is not comparable and gets no times. "
+           "\"Spread\" is (max - min) / median of the "
            "last target. One-thread runs that got less than 90 % of a core were repeated; what is "
            "still below in the CPU column was disturbed, and seconds there are too long. "
            "For sheaf the CPU column counts the whole process, reading and writing included.\n"]
