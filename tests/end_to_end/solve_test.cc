@@ -168,7 +168,7 @@ TEST_F(SolveVerb, NoiseIsAllThatIsLeft) {
 class InterruptedSolve : public SolveVerb {
  protected:
   void SetUp() override {
-    generate({"--cameras", "150", "--points", "60000", "--point-noise", "0.5", "--center-noise",
+    generate({"--cameras", "200", "--points", "120000", "--point-noise", "0.5", "--center-noise",
               "0.2", "--rotation-noise", "0.05", "--focal-noise", "0.1"});
   }
   const Words endless_ = {"solve",
@@ -196,7 +196,7 @@ class InterruptedSolve : public SolveVerb {
 TEST_F(InterruptedSolve, CtrlCWritesTheBestStateAndExitsWith130) {
   for (const int signal : {SIGINT, SIGTERM}) {
     RunningCommand command(endless_, folder_.path());
-    ASSERT_TRUE(command.wait_for_stderr("iteration 2:"));
+    ASSERT_TRUE(command.wait_for_stderr("change -")) << "no step was accepted";
     command.send(signal);
     const Outcome outcome = command.wait();
     EXPECT_EQ(outcome.exit_code, 130) << outcome.out << outcome.err;
