@@ -23,6 +23,10 @@
 
 namespace sheaf {
 
+#if defined(SHEAF_PLAIN_THREADS)
+inline thread_local int plain_worker = 0;
+#endif
+
 /// Runs independent tasks on a fixed number of threads. Results must not depend on which thread
 /// runs which task, nor on the order: every task owns what it writes.
 class Threads {
@@ -38,7 +42,11 @@ class Threads {
 
   /// Number of the calling thread within for_each, in [0, count()).
   int worker() const {
+#if defined(SHEAF_PLAIN_THREADS)
+    return plain_worker;
+#else
     return count_ == 1 ? 0 : std::max(0, oneapi::tbb::this_task_arena::current_thread_index());
+#endif
   }
 
   /// task(i) for every i in [0, tasks), each exactly once.
@@ -52,6 +60,7 @@ class Threads {
     // Dealt out in turn, so that neighbouring tasks always run on different threads and no order
     // between them can hide that both write to one place.
     const auto work = [&](std::size_t first) {
+      plain_worker = static_cast<int>(first);
       for (std::size_t i = first; i < tasks; i += count_) task(i);
     };
     std::vector<std::jthread> others;
