@@ -7,8 +7,8 @@ from xml.sax.saxutils import escape
 # Okabe and Ito's palette, told apart with any kind of colour vision; marks differ as well.
 COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKS = ("circle", "square", "diamond", "triangle", "cross", "down", "plus")
-WIDTH, HEIGHT = 860, 440
-LEFT, RIGHT, TOP, BOTTOM = 78, 230, 40, 52
+WIDTH, HEIGHT = 960, 440
+LEFT, RIGHT, TOP, BOTTOM = 78, 330, 40, 52
 FLOOR = 1e-8  # gaps below are drawn here: they are rounding and the end of convergence
 
 

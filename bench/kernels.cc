@@ -39,7 +39,7 @@ struct Bench {
   explicit Bench(const Kernels& k) : kernels(k), problem(load_problem()) {
     batches = arrange(problem);
     const auto images = static_cast<std::uint32_t>(problem.num_images());
-    chunks = cut_into_chunks(batches, images, true, threads);
+    chunks = cut_into_chunks(batches, images, ChunkLists::pairs);
     cameras.allocate(kCameraRecord * images);
     for (std::size_t i = 0; i < images; ++i) {
       double* c = &cameras[kCameraRecord * i];
@@ -104,7 +104,8 @@ void eliminate(benchmark::State& state, const Kernels* kernels, int stages) {
   for (auto _ : state) {
     for (const Chunk& c : bench.chunks.chunks) {
       if (stages & kLinearize) kernels->linearize(bench.in, c, records, out);
-      if (stages & kDiagonal) kernels->diagonal(bench.chunks, c, records, bench.diagonal.data());
+      if (stages & kDiagonal)
+        kernels->diagonal(bench.batches, bench.chunks, c, records, bench.diagonal.data());
       if (stages & kPairs) kernels->pairs(bench.chunks, c, records, bench.tiles.data());
     }
     benchmark::ClobberMemory();
@@ -128,6 +129,21 @@ void trial(benchmark::State& state, const Kernels* kernels) {
     benchmark::DoNotOptimize(to.square_sum);
   }
   report(state, 230 * bench.observations(), 28 * bench.observations(), bench);
+}
+
+void product(benchmark::State& state, const Kernels* kernels) {
+  Bench bench(*kernels);
+  const Records records = records_in(bench.scratch.data(), bench.chunks);
+  EliminateOutput out{bench.factors.data(), 0, 0, 0};
+  for (const Chunk& c : bench.chunks.chunks) kernels->linearize(bench.in, c, records, out);
+  const ProductInput in{&bench.batches, bench.cameras.data(), bench.points.data(),
+                        bench.factors.data()};
+  Buffer<double> saved(product_scratch_doubles(bench.batches));
+  Buffer<double> y(kProductRecord * bench.problem.num_images());
+  y.fill(0);
+  for (auto _ : state)
+    for (const Chunk& c : bench.chunks.chunks) kernels->product(in, c, saved.data(), y.data());
+  report(state, 280 * bench.observations(), 12 * bench.observations(), bench);
 }
 
 void square_sum(benchmark::State& state, const Kernels* kernels) {
@@ -160,11 +176,16 @@ void cholesky(benchmark::State& state, const Kernels* kernels) {
   report_flops(state, m * m * m / 3 + 2 * m * m);
 }
 
+BundleSystem make_system(const Problem& problem, const Kernels& kernels, Threads& threads) {
+  return BundleSystem(problem, arrange(problem), number_columns(problem, {}), false, false,
+                      SolverKind::dense, kernels, threads);
+}
+
 void setup(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(1);
   for (auto _ : state) {
-    BundleSystem system(problem, {}, false, {}, *kernels, threads);
+    BundleSystem system = make_system(problem, *kernels, threads);
     benchmark::DoNotOptimize(system.bytes());
   }
 }
@@ -178,9 +199,9 @@ void arrange_only(benchmark::State& state) {
 void step(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(static_cast<int>(state.range(0)));
-  BundleSystem system(problem, {}, false, {}, *kernels, threads);
+  BundleSystem system = make_system(problem, *kernels, threads);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(system.propose(1e-4).cost);
+    benchmark::DoNotOptimize(system.propose({1e-4}).cost);
     benchmark::DoNotOptimize(system.trial().cost);
   }
 }
@@ -198,6 +219,7 @@ void register_all() {
     RegisterBenchmark((name + "/eliminate").c_str(), eliminate, k, kLinearize | kDiagonal | kPairs)
         ->Unit(ms);
     RegisterBenchmark((name + "/trial").c_str(), trial, k)->Unit(ms);
+    RegisterBenchmark((name + "/product").c_str(), product, k)->Unit(ms);
     RegisterBenchmark((name + "/square_sum").c_str(), square_sum, k)->Unit(ms);
     RegisterBenchmark((name + "/cholesky").c_str(), cholesky, k)
         ->Arg(144)

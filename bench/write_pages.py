@@ -23,7 +23,8 @@ PEERS = (("ceres-head", "Ceres HEAD"), ("ceres-2.1", "Ceres 2.1"), ("g2o", "g2o"
 def machine_text(machine):
     words = [machine["cpu"], f"{machine['cores']} cores"]
     if "double_gflops" in machine:
-        words += [machine["simd"], f"{machine['double_gflops']['one']:.0f} Gflop/s double a core",
+        simd = "AVX-512" if machine["simd"].startswith("AVX3") else machine["simd"]
+        words += [simd, f"{machine['double_gflops']['one']:.0f} Gflop/s double a core",
                   f"{machine['triad_gbytes_s']['all']:.0f} GB/s"]
     return ", ".join(words)
 
