@@ -41,6 +41,7 @@ Json options_json(const SolveArguments& a) {
           {"cheirality", a.cheirality},
           {"fix", fix},
           {"solver", a.solver},
+          {"memory_limit_bytes", a.memory_limit_bytes},
           {"initial_damping", a.initial_damping},
           {"simd", a.simd}};
 }

@@ -14,6 +14,12 @@ Progress::Progress(bool quiet)
              : isatty(STDERR_FILENO) ? Style::table
                                      : Style::lines) {}
 
+void Progress::report_plan(const Summary& summary) {
+  if (style_ == Style::none) return;
+  fmt::print(stderr, "solver {}: {}; memory about {:.0f} MB\n", summary.solver,
+             summary.solver_reason, 1e-6 * static_cast<double>(summary.forecast_bytes));
+}
+
 void Progress::report(const Iteration& it) {
   const double change = it.index == 0 ? 0 : it.trial_cost - cost_;
   cost_ = it.cost;

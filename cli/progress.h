@@ -10,6 +10,8 @@ namespace sheaf {
 class Progress {
  public:
   explicit Progress(bool quiet);
+  /// The solver chosen and the memory forecast, before anything is allocated.
+  void report_plan(const Summary& summary);
   void report(const Iteration& iteration);
 
  private:

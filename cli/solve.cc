@@ -77,6 +77,7 @@ int run(const Arguments& arguments) {
   SolveOptions options = solve_options(arguments.solve);
   options.threads = arguments.common.threads;
   options.stop = interrupt.token();
+  options.on_plan = [&](const Summary& summary) { progress.report_plan(summary); };
   options.on_iteration = [&](const Iteration& iteration) {
     progress.report(iteration);
     return true;

@@ -19,8 +19,12 @@ namespace {
 const std::map<std::string, Cheirality> kCheiralities = {{"formula", Cheirality::formula},
                                                          {"reject", Cheirality::reject},
                                                          {"hold-out", Cheirality::hold_out}};
-const std::map<std::string, CameraSolverKind> kSolvers = {{"auto", CameraSolverKind::automatic},
-                                                          {"dense", CameraSolverKind::dense}};
+const std::map<std::string, CameraSolverKind> kSolvers = {
+    {"auto", CameraSolverKind::automatic},
+    {"dense", CameraSolverKind::dense},
+    {"iterative", CameraSolverKind::iterative},
+    {"iterative-explicit", CameraSolverKind::iterative_explicit},
+    {"iterative-implicit", CameraSolverKind::iterative_implicit}};
 const std::map<std::string, Simd> kSimds = {{"best", Simd::best},
                                             {"scalar", Simd::scalar},
                                             {"sse4", Simd::sse4},
@@ -105,10 +109,18 @@ void add_solve_options(CLI::App& verb, SolveArguments& a) {
             return parse_fix(text, ignored);
           },
           ""));
-  verb.add_option("--solver", a.solver, "how the camera system is solved: auto, dense")
+  verb.add_option("--solver", a.solver,
+                  "how the camera system is solved: auto (by counted work), dense (formed, "
+                  "Cholesky), iterative (conjugate gradients; iterative-explicit on the formed "
+                  "blocks, iterative-implicit with nothing formed)")
       ->type_name("NAME")
-      ->check(one_of({"auto", "dense"}))
+      ->check(one_of({"auto", "dense", "iterative", "iterative-explicit", "iterative-implicit"}))
       ->capture_default_str();
+  verb.add_option("--memory-limit", a.memory_limit_bytes,
+                  "take a leaner solver, or refuse (exit 5), rather than exceed this many bytes; "
+                  "units K, M, G are powers of 1024")
+      ->type_name("BYTES")
+      ->transform(CLI::AsSizeValue(false));
   verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
       ->type_name("LAMBDA")
       ->check(number_in(0, most, true, "a number from 0 up"))
@@ -128,6 +140,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   options.cheirality = kCheiralities.at(a.cheirality);
   if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
   options.solver = kSolvers.at(a.solver);
+  options.memory_limit_bytes = a.memory_limit_bytes;
   options.initial_damping = a.initial_damping;
   options.simd = kSimds.at(a.simd);
   return options;

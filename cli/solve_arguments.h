@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 
 #include "sheaf/options.h"
@@ -17,6 +18,7 @@ struct SolveArguments {
   std::string cheirality = "formula";
   std::string fix;
   std::string solver = "auto";
+  std::uint64_t memory_limit_bytes = 0;  ///< 0: none
   double initial_damping = 0;
   std::string simd = "best";
 };

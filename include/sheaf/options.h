@@ -11,6 +11,7 @@
 namespace sheaf {
 
 struct Iteration;
+struct Summary;
 
 /// What to do with observations whose point lies behind their camera.
 enum class Cheirality {
@@ -23,7 +24,13 @@ enum class Cheirality {
 enum class Simd { best, scalar, sse4, avx2, avx512 };
 
 /// How the reduced camera system is solved.
-enum class CameraSolverKind { automatic, dense };
+enum class CameraSolverKind {
+  automatic,           ///< the cheapest by counted flops and bytes
+  dense,               ///< formed, dense Cholesky
+  iterative,           ///< conjugate gradients, explicit or implicit by counted flops and bytes
+  iterative_explicit,  ///< conjugate gradients on the formed blocks
+  iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed
+};
 
 struct SolveOptions {
   int max_iterations = 50;  ///< trust region steps tried, rejected ones included
@@ -34,9 +41,12 @@ struct SolveOptions {
   Cheirality cheirality = Cheirality::formula;
   Fixed fixed;
   CameraSolverKind solver = CameraSolverKind::automatic;
-  double initial_damping = 0;  ///< 0: the default rule
-  Simd simd = Simd::best;      ///< for tests and measurements
+  std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
+  double initial_damping = 0;            ///< 0: the default rule
+  Simd simd = Simd::best;                ///< for tests and measurements
 
+  /// Called once the solver is chosen and before it allocates: solver, reason and forecast are set.
+  std::function<void(const Summary&)> on_plan;
   /// Called after the start was evaluated (index 0) and after every step; return false to stop.
   std::function<bool(const Iteration&)> on_iteration;
   std::stop_token stop;  ///< asks the solver to end within one evaluation

@@ -4,23 +4,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-
-#include "linear/block_solver.h"
+#include <utility>
 
 namespace sheaf {
 
-BundleSystem::BundleSystem(const Problem& problem, const Fixed& fixed, bool watch_behind,
-                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
-                           Threads& threads)
-    : points_held_(fixed.points),
+namespace {
+
+ChunkLists lists_for(SolverKind kind) {
+  switch (kind) {
+    case SolverKind::dense:
+    case SolverKind::explicit_cg:
+      return ChunkLists::pairs;
+    case SolverKind::blocks:
+      return ChunkLists::diagonal;
+    case SolverKind::implicit_cg:
+      return ChunkLists::none;
+  }
+  return ChunkLists::none;
+}
+
+}  // namespace
+
+BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns columns,
+                           bool points_held, bool watch_behind, SolverKind kind,
+                           const Kernels& kernels, Threads& threads)
+    : points_held_(points_held),
       watch_behind_(watch_behind),
       kernels_(kernels),
       threads_(threads),
-      batches_(arrange(problem, skip)),
+      batches_(std::move(batches)),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              !fixed.points, threads)),
-      columns_(number_columns(problem, fixed)) {
+                              points_held ? ChunkLists::diagonal : lists_for(kind))),
+      columns_(std::move(columns)) {
   fill_state(problem);
   const std::size_t slices = chunks_.slices.size() - 1;
   factors_.allocate(kFactorGroup * batches_.groups.size());
@@ -30,8 +45,21 @@ BundleSystem::BundleSystem(const Problem& problem, const Fixed& fixed, bool watc
   const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   camera_step_.allocate(padded);
-  if (couples_images() || problem.cameras.size() < problem.num_images())
-    dense_ = std::make_unique<DenseCameraSolver>(columns_, kernels.name);
+  switch (kind) {
+    case SolverKind::blocks:
+      solver_ = make_block_solver(columns_, threads);
+      break;
+    case SolverKind::dense:
+      solver_ = make_dense_solver(columns_, kernels, threads);
+      break;
+    case SolverKind::explicit_cg:
+      solver_ = make_explicit_solver(columns_, chunks_, threads);
+      break;
+    case SolverKind::implicit_cg:
+      solver_ = make_implicit_solver(
+          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_}, kernels, threads);
+      break;
+  }
 }
 
 void BundleSystem::fill_state(const Problem& problem) {
@@ -65,12 +93,12 @@ void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<doub
   std::fill(record + camera_record::kStep, record + kCameraRecord, 0.0);
 }
 
-Step BundleSystem::propose(double damping) {
+Step BundleSystem::propose(const StepRequest& request) {
   const std::size_t slices = chunks_.slices.size() - 1;
   const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
-  const EliminateInput in{&batches_,      &chunks_, cameras_.data(),
-                          points_.data(), damping,  points_held_};
+  const EliminateInput in{&batches_,      &chunks_,        cameras_.data(),
+                          points_.data(), request.damping, points_held_};
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[threads_.worker()];
@@ -83,12 +111,12 @@ Step BundleSystem::propose(double damping) {
     outputs[s] = {factors_.data(), 0, 0, 0};
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
       kernels_.linearize(in, chunks_.chunks[c], records, outputs[s]);
-      kernels_.diagonal(chunks_, chunks_.chunks[c], records, diagonal);
+      kernels_.diagonal(batches_, chunks_, chunks_.chunks[c], records, diagonal);
       kernels_.pairs(chunks_, chunks_.chunks[c], records, tiles);
     }
   });
   add_slices();
-  return collect_step(damping, outputs);
+  return collect_step(request, outputs);
 }
 
 /// Adds the slices' sums into the first slice's, in order.
@@ -107,7 +135,8 @@ void BundleSystem::add_slices() {
   add(diagonal_);
 }
 
-Step BundleSystem::collect_step(double damping, const std::vector<EliminateOutput>& outputs) {
+Step BundleSystem::collect_step(const StepRequest& request,
+                                const std::vector<EliminateOutput>& outputs) {
   Step step;
   double square_sum = 0, gradient2 = 0;
   point_decrease_ = 0;
@@ -118,25 +147,28 @@ Step BundleSystem::collect_step(double damping, const std::vector<EliminateOutpu
   }
   step.cost = square_sum / 2;
   // w is whitened by V (1 + damping): undo the damping's part.
-  step.gradient_max = std::sqrt(gradient2 * (1 + damping));
+  step.gradient_max = std::sqrt(gradient2 * (1 + request.damping));
   vectors_.gather({&chunks_, tiles_.data(), diagonal_.data()}, columns_);
   for (std::int32_t c = 0; c < columns_.count; ++c) {
     const double square = std::clamp(vectors_.squares[c], kDiagonalFloor, kDiagonalCeiling);
-    damping_[c] = damping * square;
+    damping_[c] = request.damping * square;
     step.gradient_max = std::max(step.gradient_max, std::abs(vectors_.rhs[c]) / std::sqrt(square));
   }
-  step.solved = std::isfinite(square_sum) && solve_cameras();
+  step.solved = std::isfinite(square_sum) && solve_cameras(request, step);
   return step;
 }
 
-bool BundleSystem::solve_cameras() {
+bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
   if (columns_.count == 0) return true;
-  const ReducedSums sums{&chunks_, tiles_.data(), diagonal_.data()};
-  const bool solved =
-      dense_ ? dense_->solve(sums, vectors_, damping_.data(), threads_, camera_step_)
-             : solve_blocks(sums, columns_, vectors_, damping_.data(), threads_, camera_step_);
-  return solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
-                               [](double x) { return std::isfinite(x); });
+  const CameraSystem system{{&chunks_, tiles_.data(), diagonal_.data()},
+                            &vectors_,
+                            damping_.data(),
+                            request.forcing,
+                            request.cancelled};
+  const CameraSolution solution = solver_->solve(system, camera_step_);
+  step.linear_iterations = solution.iterations;
+  return solution.solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
+                                        [](double x) { return std::isfinite(x); });
 }
 
 /// Steps every camera; returns the largest relative change of a block: radians for rotations,
@@ -240,8 +272,7 @@ std::uint64_t BundleSystem::bytes() const {
   sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
          factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
   sum += scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
-  if (dense_) sum += DenseCameraSolver::bytes(columns_.count);
-  return sum;
+  return sum + solver_->bytes();
 }
 
 }  // namespace sheaf

@@ -10,11 +10,11 @@
 #include "linear/chunks.h"
 #include "linear/columns.h"
 #include "linear/kernels.h"
+#include "linear/plan.h"
 #include "linear/system.h"
 #include "platform/buffer.h"
 #include "platform/parallel.h"
 #include "residual/batches.h"
-#include "sheaf/error.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -23,19 +23,18 @@ namespace sheaf {
 /// a slice in order, slices in order; so the bytes do not depend on the number of threads.
 class BundleSystem : public System {
  public:
-  /// skip[i] != 0 leaves observation i out; watch_behind: count in each trial the observations
-  /// that newly go behind their camera. Throws std::bad_alloc.
-  BundleSystem(const Problem& problem, const Fixed& fixed, bool watch_behind,
-               const std::vector<std::uint8_t>& skip, const Kernels& kernels, Threads& threads);
+  /// watch_behind: count in each trial the observations that newly go behind their camera.
+  /// Throws std::bad_alloc.
+  BundleSystem(const Problem& problem, Batches batches, Columns columns, bool points_held,
+               bool watch_behind, SolverKind kind, const Kernels& kernels, Threads& threads);
 
-  Step propose(double damping) override;
+  Step propose(const StepRequest& request) override;
   Trial trial() override;
   void accept() override;
   void store(Problem& problem) const override;
 
   /// Observations behind their camera at the held state.
   std::uint64_t count_behind();
-  bool couples_images() const { return !chunks_.tiles.empty(); }
   std::uint64_t bytes() const;
 
  private:
@@ -43,8 +42,8 @@ class BundleSystem : public System {
   void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                            const double* parameters, double* records);
   void add_slices();
-  Step collect_step(double damping, const std::vector<EliminateOutput>& outputs);
-  bool solve_cameras();
+  Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
+  bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();
 
   const bool points_held_, watch_behind_;
@@ -66,7 +65,7 @@ class BundleSystem : public System {
   std::vector<Buffer<double>> scratch_;  ///< one per thread
   CameraVectors vectors_;
   Buffer<double> damping_, camera_step_;
-  std::unique_ptr<DenseCameraSolver> dense_;
+  std::unique_ptr<CameraSolver> solver_;
   double point_decrease_ = 0;
 };
 

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <functional>
+#include <memory>
 
 #include "linear/chunks.h"
 #include "linear/columns.h"
-#include "linear/dense_cholesky.h"
+#include "linear/kernels.h"
+#include "platform/buffer.h"
 #include "platform/parallel.h"
 
 namespace sheaf {
@@ -21,6 +23,8 @@ struct ReducedSums {
 
 /// Entry (r, k) of an image's symmetric diagonal block, stored 8 + 1.
 double diagonal_entry(const double* block, int r, int k);
+/// Entry (r, k) of a tile: row image's r, column image's k.
+double tile_entry(const double* tile, int r, int k);
 
 /// Right-hand side b and diag(J^T J) of the free columns.
 struct CameraVectors {
@@ -28,23 +32,52 @@ struct CameraVectors {
   void gather(const ReducedSums& sums, const Columns& columns);
 };
 
-/// S + lambda diag(J^T J), dense, factored by Cholesky.
-class DenseCameraSolver {
- public:
-  DenseCameraSolver(const Columns& columns, const char* simd_name);
-
-  static std::uint64_t bytes(std::int32_t columns) { return DenseCholesky::bytes(columns); }
-
-  /// damping: lambda times the clamped diag(J^T J), one for each column. x <- the step.
-  bool solve(const ReducedSums& sums, const CameraVectors& vectors, const double* damping,
-             Threads& threads, Buffer<double>& x);
-
- private:
-  void add_diagonal(const ReducedSums& sums, std::size_t image);
-  void add_tile(const double* tile, const Tile& place);
-
-  const Columns& columns_;
-  DenseCholesky cholesky_;
+/// (S + D) x = b, to solve exactly or, by an iterative solver, until the quadratic model's
+/// decrease per step falls below `forcing` of its mean.
+struct CameraSystem {
+  ReducedSums sums;
+  const CameraVectors* vectors;
+  const double* damping;  ///< D: one for each column
+  double forcing = 0.1;
+  const std::function<bool()>* cancelled = nullptr;
 };
+
+struct CameraSolution {
+  bool solved = false;
+  int iterations = 0;  ///< of an iterative solver
+};
+
+/// The seam inside one home of a System: how the camera system is solved.
+class CameraSolver {
+ public:
+  virtual ~CameraSolver() = default;
+  /// x has room for the columns rounded up to a multiple of 8.
+  virtual CameraSolution solve(const CameraSystem& system, Buffer<double>& x) = 0;
+  virtual std::uint64_t bytes() const = 0;
+};
+
+/// S formed and factored as one dense matrix.
+std::unique_ptr<CameraSolver> make_dense_solver(const Columns& columns, const Kernels& kernels,
+                                                Threads& threads);
+
+/// One small system for each image: exact where images do not couple (points held, own lenses).
+std::unique_ptr<CameraSolver> make_block_solver(const Columns& columns, Threads& threads);
+
+/// Conjugate gradients on S formed as blocks, preconditioned by its diagonal blocks.
+std::unique_ptr<CameraSolver> make_explicit_solver(const Columns& columns, const Chunks& chunks,
+                                                   Threads& threads);
+
+/// What the implicit product reads: the held state, whose camera records carry x as their step.
+struct HeldState {
+  const Batches* batches;
+  const Chunks* chunks;
+  Buffer<double>* cameras;
+  const Buffer<double>* points;
+  const Buffer<double>* factors;
+};
+
+/// Conjugate gradients with S never formed: products recompute the Jacobians from the state.
+std::unique_ptr<CameraSolver> make_implicit_solver(const Columns& columns, const HeldState& state,
+                                                   const Kernels& kernels, Threads& threads);
 
 }  // namespace sheaf

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "linear/plan.h"
+
 namespace sheaf {
 namespace {
 
@@ -165,10 +167,7 @@ void list_pairs(const Batches& batches, const TileNumbers& numbers, Chunk& chunk
   runs.clear();
 }
 
-/// Slices of about equal work; few enough that their sums cost little to clear and add.
-std::vector<std::uint32_t> cut_into_slices(const Chunks& c) {
-  constexpr double kFlopsPerSlice = 15e6;
-  constexpr double kBytes = 48e6;
+std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_images) {
   std::vector<double> work{0};
   for (const Chunk& chunk : c.chunks) {
     double flops = 8.0 * 700 * static_cast<double>(chunk.end_batch - chunk.first_batch);
@@ -176,9 +175,7 @@ std::vector<std::uint32_t> cut_into_slices(const Chunks& c) {
       flops += 490.0 * c.pair_runs[r].count;
     work.push_back(work.back() + flops);
   }
-  const double sums = 704.0 * static_cast<double>(c.tiles.size()) + 1;
-  const double wanted = std::min({32.0, work.back() / kFlopsPerSlice, kBytes / sums});
-  const int count = std::max(1, static_cast<int>(wanted));
+  const int count = count_slices(work.back(), c.tiles.size(), num_images);
   std::vector<std::uint32_t> slices{0};
   for (int s = 1; s < count; ++s) {
     const double target = work.back() * s / count;
@@ -191,8 +188,7 @@ std::vector<std::uint32_t> cut_into_slices(const Chunks& c) {
 
 }  // namespace
 
-Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, bool with_pairs,
-                       Threads&) {
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists) {
   Chunks out;
   const std::uint32_t groups = static_cast<std::uint32_t>(batches.groups.size());
   for (std::uint32_t g = 0; g < groups;) {
@@ -209,10 +205,12 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, bool wi
     out.most_batches = std::max(out.most_batches, chunk.end_batch - chunk.first_batch);
     out.chunks.push_back(chunk);
   }
-  out.diagonal.reserve(batches.observations);
-  Runs by_image(num_images);
-  for (Chunk& chunk : out.chunks) list_diagonal(batches, chunk, by_image, out);
-  if (with_pairs) {
+  if (lists != ChunkLists::none) {
+    out.diagonal.reserve(batches.observations);
+    Runs by_image(num_images);
+    for (Chunk& chunk : out.chunks) list_diagonal(batches, chunk, by_image, out);
+  }
+  if (lists == ChunkLists::pairs) {
     TileNumbers numbers(batches, num_images);
     out.tiles = numbers.take_tiles();
     std::uint64_t pairs = 0;
@@ -223,7 +221,7 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, bool wi
     std::vector<std::uint32_t> tile_of;
     for (Chunk& chunk : out.chunks) list_pairs(batches, numbers, chunk, by_tile, tile_of, out);
   }
-  out.slices = cut_into_slices(out);
+  out.slices = cut_into_slices(out, num_images);
   return out;
 }
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "platform/buffer.h"
-#include "platform/parallel.h"
 #include "residual/batches.h"
 
 namespace sheaf {
@@ -60,9 +59,12 @@ struct Chunks {
   std::vector<std::uint32_t> slices;
 };
 
-/// with_pairs false: no off-diagonal blocks (points held: images do not couple).
-/// Requires batches.longest_track <= kLongestTrack.
-Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, bool with_pairs,
-                       Threads& threads);
+/// What a chunk lists of its records.
+enum class ChunkLists {
+  none,      ///< nothing: sums run over the records in their own order
+  diagonal,  ///< records by image
+  pairs,     ///< records by image, and pairs by tile; needs longest_track <= kLongestTrack
+};
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists);
 
 }  // namespace sheaf

@@ -24,11 +24,12 @@ Columns number_columns(const Problem& problem, const Fixed& fixed) {
     if (!lens_numbered[camera] && !lens_held[camera])
       for (int k = 0; k < 3; ++k)
         if (!parameter_held[k]) parameters[k] = out.count++;
-    out.plain = out.plain && !lens_numbered[camera];
+    for (int k = 0; k < 3; ++k) {
+      columns[6 + k] = parameters[k];
+      out.lens_shared = out.lens_shared || (lens_numbered[camera] && parameters[k] >= 0);
+    }
     lens_numbered[camera] = true;
-    for (int k = 0; k < 3; ++k) columns[6 + k] = parameters[k];
   }
-  out.plain = out.plain && out.count == static_cast<std::int32_t>(9 * problem.num_images());
   return out;
 }
 

@@ -15,8 +15,9 @@ struct Columns {
   static constexpr std::int32_t kFixed = -1;
   std::vector<std::int32_t> of_image;  ///< 9 per image
   std::int32_t count = 0;
-  bool plain = true;  ///< image i has exactly the columns 9 i ... 9 i + 8
+  bool lens_shared = false;  ///< some lens with a free parameter serves several images
 
+  std::size_t num_images() const { return of_image.size() / 9; }
   const std::int32_t* image(std::size_t i) const { return &of_image[9 * i]; }
 };
 

@@ -187,7 +187,7 @@ void DenseCholesky::clear(Threads& threads) {
   });
 }
 
-bool DenseCholesky::factor(Threads& threads) {
+bool DenseCholesky::factor(Threads& threads, const std::function<bool()>* cancelled) {
   constexpr std::size_t kRows = 192, kColumns = 64, kSerial = 400;
   // Below kSerial columns waking threads costs more than the work they would share.
   const auto each = [&](std::size_t tasks, const auto& task) {
@@ -197,6 +197,7 @@ bool DenseCholesky::factor(Threads& threads) {
   double* A = A_.data();
   const std::size_t rows = (n_ + 7) / 8 * 8;
   for (std::size_t k = 0; k < n_; k += kPanel) {
+    if (cancelled != nullptr && (*cancelled)()) return false;
     const std::size_t width = std::min(kPanel, n_ - k), below = k + width;
     if (!kernels_.factor_block(A, lda_, k, width, inverse_.data())) return false;
     if (below >= n_) break;

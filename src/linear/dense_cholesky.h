@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "platform/buffer.h"
@@ -46,8 +47,9 @@ class DenseCholesky {
   double at(std::size_t row, std::size_t column) const { return A_[column * lda_ + row]; }
   std::size_t size() const { return n_; }
 
-  /// False where a pivot is not positive: the matrix is not positive definite to rounding.
-  bool factor(Threads& threads);
+  /// False where a pivot is not positive: the matrix is not positive definite to rounding; or
+  /// where it was cancelled, which is asked once for each panel.
+  bool factor(Threads& threads, const std::function<bool()>* cancelled = nullptr);
   /// x <- A^-1 x, after factor(). x has room for size() rounded up to a multiple of 8.
   void solve(double* x) const;
 

@@ -25,8 +25,9 @@ void linearize(const EliminateInput& in, const Chunk& chunk, const Records& reco
   linearize_chunk(in, chunk, records, out);
 }
 
-void diagonal(const Chunks& chunks, const Chunk& chunk, const Records& records, double* sums) {
-  diagonal_products(chunks, chunk, records, sums);
+void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
+              const Records& records, double* sums) {
+  diagonal_products(batches, chunks, chunk, records, sums);
 }
 
 void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, double* tiles) {

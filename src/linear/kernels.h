@@ -102,7 +102,7 @@ struct Kernels {
   /// Linearises the chunk, factors its points' blocks and writes the records; adds to `out`.
   void (*linearize)(const EliminateInput&, const Chunk&, const Records&, EliminateOutput& out);
   /// Adds the records' products to the diagonal blocks and the right-hand side of a slice.
-  void (*diagonal)(const Chunks&, const Chunk&, const Records&, double* diagonal);
+  void (*diagonal)(const Batches&, const Chunks&, const Chunk&, const Records&, double* diagonal);
   /// Adds the records' products to the off-diagonal blocks of a slice.
   void (*pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
   /// Back-substitutes the chunk's points and evaluates the cost there; adds to `out`.

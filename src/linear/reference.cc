@@ -178,7 +178,21 @@ void linearize(const EliminateInput& in, const Chunk& chunk, const Records& reco
       eliminate_point(in, chunk, g, l, records.T, records.C, out);
 }
 
-void diagonal(const Chunks& chunks, const Chunk& chunk, const Records& records, double* sums) {
+void diagonal_in_order(const Batches& batches, const Chunk& chunk, const Records& records,
+                       double* sums) {
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t o = 0; o < batches.groups[g].track; ++o)
+      for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l) {
+        const std::uint64_t b = batches.groups[g].first_batch + o;
+        const std::uint64_t record = 8 * (b - chunk.first_batch) + l;
+        add_diagonal(records.T + kTRecord * record, records.C + kCRecord * record,
+                     sums + kDiagonalDoubles * batches.image[8 * b + l]);
+      }
+}
+
+void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
+              const Records& records, double* sums) {
+  if (chunks.diagonal.empty()) return diagonal_in_order(batches, chunk, records, sums);
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun& run = chunks.diagonal_runs[i];
     for (std::uint64_t r = run.first; r < run.first + run.count; ++r) {

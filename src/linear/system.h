@@ -3,15 +3,23 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 
 #include "sheaf/problem.h"
 
 namespace sheaf {
 
+struct StepRequest {
+  double damping = 0;    ///< lambda: J^T J + lambda diag(J^T J)
+  double forcing = 0.1;  ///< how exactly an iterative solver solves (CameraSystem::forcing)
+  const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
+};
+
 /// A damped Gauss-Newton step was computed (or not), points eliminated, from the held state.
 struct Step {
-  bool solved = false;      ///< false: the camera system was not positive definite or not finite
-  double cost = 0;          ///< 1/2 sum |r|^2 at the held state, px^2
+  bool solved =
+      false;        ///< false: the camera system was not positive definite, not finite or cancelled
+  double cost = 0;  ///< 1/2 sum |r|^2 at the held state, px^2
   double gradient_max = 0;  ///< px: largest |J_i^T r| / |J_i| over the free columns
   int linear_iterations = 0;
 };
@@ -26,7 +34,7 @@ struct Trial {
 
 /// The one seam between the trust region and everything below it. Only scalars cross: state and
 /// vectors live behind it, wherever that is. The loop above calls
-///   propose(damping) -> trial() -> accept() or propose(another damping) -> ...
+///   propose(request) -> trial() -> accept() or propose(with more damping) -> ...
 class System {
  public:
   virtual ~System() = default;
@@ -34,7 +42,7 @@ class System {
   /// Linearises at the held state, eliminates the points under (J^T J + damping diag(J^T J)) and
   /// solves for the cameras. Asked again without accept(), the state is the same and only the
   /// damping differs.
-  virtual Step propose(double damping) = 0;
+  virtual Step propose(const StepRequest& request) = 0;
 
   /// Back-substitutes the points and evaluates the cost at the stepped state, in one pass.
   virtual Trial trial() = 0;

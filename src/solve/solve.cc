@@ -4,11 +4,13 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "linear/bundle_system.h"
 #include "linear/kernel_table.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
+#include "solve/choose_solver.h"
 #include "solve/trust_region.h"
 
 namespace sheaf {
@@ -56,26 +58,47 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
   if (!(options.tolerance >= 0)) return usage("tolerance is negative or not a number");
+  if (!(options.gradient_tolerance >= 0))
+    return usage("gradient_tolerance is negative or not a number");
+  if (!(options.time_limit_s >= 0)) return usage("time_limit_s is negative or not a number");
   if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
   if (options.threads < 0) return usage("threads is negative");
   return {};
 }
 
-void describe(const Problem& problem, const BundleSystem& system, const Kernels& kernels,
-              int threads, Summary& summary) {
-  const std::string images = std::to_string(problem.num_images());
-  if (system.couples_images()) {
-    summary.solver = "dense";
-    summary.solver_reason = "the reduced camera matrix of " + images +
-                            " images is formed explicitly and factored by dense Cholesky";
-  } else {
-    summary.solver = "blocks";
-    summary.solver_reason =
-        "no free point couples the images: one small system for each of the " + images;
+/// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
+Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+                    const Stopwatch& clock, Summary& summary) {
+  std::vector<std::uint8_t> skip;
+  if (options.cheirality == Cheirality::hold_out) {
+    summary.rejected_observations = evaluate(problem).behind;
+    skip.assign(problem.num_observations(), 0);
+    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
   }
+  Threads threads(options.threads);
+  Columns columns = number_columns(problem, options.fixed);
+  const std::uint64_t resident = resident_bytes();
+  Batches batches = arrange(problem, skip);
+  const WorkCounts counts = count_work(batches, columns, options.fixed.points);
+  Result<Choice> choice = choose_solver(counts, options, threads.count(), resident);
+  if (!choice.ok()) return choice.error();
+  summary.solver = to_string(choice.value().plan.kind);
+  summary.solver_reason = choice.value().plan.reason;
+  summary.forecast_bytes = choice.value().forecast_bytes;
   summary.simd = kernels.name;
-  summary.threads = threads;
-  summary.forecast_bytes = resident_bytes() + system.bytes();
+  summary.threads = threads.count();
+  if (options.on_plan) options.on_plan(summary);
+
+  BundleSystem system(problem, std::move(batches), std::move(columns), options.fixed.points,
+                      options.cheirality != Cheirality::formula, choice.value().plan.kind, kernels,
+                      threads);
+  if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
+  summary.setup_s = clock.seconds();
+  minimize(system, options, clock, summary);
+  system.store(problem);
+  summary.solve_s = clock.seconds() - summary.setup_s;
+  if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
+  return {};
 }
 
 double rms(double cost, std::size_t observations) {
@@ -91,23 +114,9 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
   if (!kernels.ok()) return kernels.error();
 
   Summary summary;
-  std::vector<std::uint8_t> skip;
-  if (options.cheirality == Cheirality::hold_out) {
-    summary.rejected_observations = evaluate(problem).behind;
-    skip.assign(problem.num_observations(), 0);
-    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
-  }
   try {
-    Threads threads(options.threads);
-    BundleSystem system(problem, options.fixed, options.cheirality != Cheirality::formula, skip,
-                        *kernels.value(), threads);
-    describe(problem, system, *kernels.value(), threads.count(), summary);
-    if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
-    summary.setup_s = clock.seconds();
-    minimize(system, options, clock, summary);
-    system.store(problem);
-    summary.solve_s = clock.seconds() - summary.setup_s;
-    if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
+    if (Result<void> done = refine(problem, options, *kernels.value(), clock, summary); !done.ok())
+      return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
   }

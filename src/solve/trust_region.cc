@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@ namespace {
 /// trafalgar-21 and still hold ladybug-49, which fails at 1e-6 and crawls at 1e-3.
 constexpr double kInitialDamping = 5e-5;
 constexpr double kLargestDamping = 1e32;
+constexpr double kLoosestForcing = 0.1, kTightestForcing = 1e-3;
 /// A gain below this is a step that did not help.
 constexpr double kSmallestGain = 1e-3;
 /// A step that changes no block by more than this (relative) is rounding.
@@ -49,9 +51,10 @@ class Loop {
 
   void run() {
     while (!done_) {
-      const Step step = system_.propose(damping_.lambda);
+      const Step step = system_.propose({damping_.lambda, forcing_, &cancelled_});
       if (summary_.iterations.empty()) begin(step);
       if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
+      if (!step.solved && out_of_time()) break;
       if (!step.solved) {
         reject(record(step, std::nullopt));
         continue;
@@ -111,6 +114,7 @@ class Loop {
     cost_ = it.cost = trial.cost;
     it.accepted = true;
     damping_.shrink(it.gain_ratio);
+    forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     small_decreases_ = decrease < options_.tolerance ? small_decreases_ + 1 : 0;
     publish(it);
     if (small_decreases_ >= 2)
@@ -149,6 +153,10 @@ class Loop {
     return true;
   }
 
+  bool must_stop() const {
+    return options_.stop.stop_requested() || since_start_.seconds() >= options_.time_limit_s;
+  }
+
   bool out_of_time() {
     if (options_.stop.stop_requested())
       end(Termination::stopped, "interrupted; the best state so far is kept");
@@ -182,6 +190,9 @@ class Loop {
   const Stopwatch since_begin_;
   Summary& summary_;
   Damping damping_;
+  /// An iterative solver solves loosely at first and tighter as the cost settles.
+  double forcing_ = kLoosestForcing;
+  const std::function<bool()> cancelled_ = [this] { return must_stop(); };
   double cost_ = 0;
   int small_decreases_ = 0;
   bool any_finite_trial_ = false;

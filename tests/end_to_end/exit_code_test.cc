@@ -199,6 +199,17 @@ TEST(ExitCode, UnwritableOutputIsSixAndKnownBeforeTheSolve) {
   EXPECT_EQ(run_command({"demo", "--json", "no/o"}, folder.path()).exit_code, 6);
 }
 
+TEST(ExitCode, OverTheMemoryLimitIsFiveAndNothingIsWritten) {
+  TemporaryFolder folder;
+  run_command({"generate", "in.txt", "--cameras", "40", "--points", "3000"}, folder.path());
+  const Outcome refused =
+      run_command({"solve", "in.txt", "-o", "o.txt", "--memory-limit", "1M"}, folder.path());
+  EXPECT_EQ(refused.exit_code, 5);
+  EXPECT_NE(refused.err.find("over the limit"), std::string::npos) << refused.err;
+  EXPECT_EQ(folder.names(), Words{"in.txt"});
+  EXPECT_EQ(run_command({"solve", "in.txt", "--memory-limit", "1G"}, folder.path()).exit_code, 0);
+}
+
 TEST(ExitCode, AFolderWithoutPermissionIsSix) {
   if (geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   TemporaryFolder folder;

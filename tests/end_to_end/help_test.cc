@@ -21,11 +21,12 @@ const std::set<std::string> kScene = {"--cameras",     "--points",         "--me
 std::set<std::string> options_of(const std::string& verb) {
   std::set<std::string> options = kCommon;
   if (verb == "generate" || verb == "demo") options.insert(kScene.begin(), kScene.end());
-  if (verb == "generate") options.insert("--truth");
+  if (verb == "generate")
+    options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--cheirality", "--fix", "--solver", "--initial-damping", "--simd"});
+                    "--cheirality", "--fix", "--solver", "--memory-limit", "--initial-damping", "--simd"});
   return options;
 }
 

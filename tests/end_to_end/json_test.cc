@@ -149,6 +149,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"cheirality", "reject"},
                                 {"fix", {"k1", "pose=0"}},
                                 {"solver", "dense"},
+                                {"memory_limit_bytes", 0},
                                 {"initial_damping", 0.01},
                                 {"simd", "best"}}));
   EXPECT_EQ(s["input"]["path"], "in.txt");

@@ -26,7 +26,7 @@ struct Outcome {
 
 class KernelsTest : public ::testing::Test {
  protected:
-  void make(bool points_held) {
+  void make(bool points_held, ChunkLists lists) {
     points_held_ = points_held;
     SceneOptions options;
     options.images = 9;
@@ -38,7 +38,7 @@ class KernelsTest : public ::testing::Test {
     const std::uint32_t lonely = problem.add_point(0.1, 0.2, 0.3);
     problem.add_observation(2, lonely, 10, -20);
     batches_ = arrange(problem);
-    chunks_ = cut_into_chunks(batches_, 9, !points_held, threads_);
+    chunks_ = cut_into_chunks(batches_, 9, lists);
     fill(problem);
   }
 
@@ -83,7 +83,7 @@ class KernelsTest : public ::testing::Test {
     const Records records = records_in(scratch.data(), chunks_);
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.linearize(in, chunk, records, out.eliminated);
-      kernels.diagonal(chunks_, chunk, records, out.diagonal.data());
+      kernels.diagonal(batches_, chunks_, chunk, records, out.diagonal.data());
       kernels.pairs(chunks_, chunk, records, out.tiles.data());
     }
     const TrialInput trial{&batches_,      cameras_.data(),    trial_cameras_.data(),
@@ -102,7 +102,6 @@ class KernelsTest : public ::testing::Test {
     return out;
   }
 
-  Threads threads_{1};
   Batches batches_;
   Chunks chunks_;
   Buffer<double> cameras_, trial_cameras_, points_;
@@ -129,8 +128,8 @@ void clear_padding(const Batches& batches, Outcome& o) {
 }
 
 TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
-  for (bool held : {false, true}) {
-    make(held);
+  for (ChunkLists lists : {ChunkLists::none, ChunkLists::diagonal, ChunkLists::pairs}) {
+    make(lists == ChunkLists::diagonal, lists);
     Outcome expected = run(reference_kernels());
     clear_padding(batches_, expected);
     for (const Kernels* kernels : available_kernels()) {
@@ -158,7 +157,7 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
 }
 
 TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
-  make(false);
+  make(false, ChunkLists::pairs);
   std::vector<const Kernels*> fused;
   for (const Kernels* kernels : available_kernels())
     if (kernels->fused) fused.push_back(kernels);

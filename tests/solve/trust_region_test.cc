@@ -26,7 +26,8 @@ class Valley : public System {
   using State = std::array<double, 2>;
   explicit Valley(State start, double left = 0) : held_(start), left_(left) {}
 
-  Step propose(double damping) override {
+  Step propose(const StepRequest& request) override {
+    const double damping = request.damping;
     dampings.push_back(damping);
     proposed_from.push_back(held_);
     const auto [x, y] = held_;

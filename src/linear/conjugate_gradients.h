@@ -1,0 +1,78 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+#include "linear/camera_solver.h"
+#include "linear/columns.h"
+#include "platform/buffer.h"
+
+namespace sheaf {
+
+/// y = S x over images: nine numbers per image, before damping. Fixed columns are zero in x and
+/// ignored in y; images that share a lens each hold its numbers.
+class ImageOperator {
+ public:
+  virtual ~ImageOperator() = default;
+  /// Both 16 doubles per image, nine of them used.
+  virtual void apply(const double* x, double* y) = 0;
+};
+constexpr std::size_t kImageVector = 16;
+
+/// Preconditioned conjugate gradients on (P^T S P + D) x = b with P the numbering of columns.
+/// Stops when an iteration's part of the decrease Q = -1/2 x.(b + r) of the quadratic model falls
+/// below `forcing` of the mean part so far (Nash and Sofer 1990), or the residual is at rounding.
+class ConjugateGradients {
+ public:
+  explicit ConjugateGradients(const Columns& columns);
+
+  template <class Preconditioner>
+  CameraSolution run(ImageOperator& S, const Preconditioner& M, const CameraSystem& system,
+                     Buffer<double>& x) {
+    const double* b = system.vectors->rhs.data();
+    start(b, x);
+    M.solve(r_.data(), z_.data());
+    copy(z_, p_);
+    double rz = dot(r_, z_);
+    const double rz_start = rz;
+    double model = 0;
+    if (!(rz > 0)) return {rz == 0, 0};
+    for (int iteration = 1; iteration <= kMaxIterations; ++iteration) {
+      if (system.cancelled != nullptr && (*system.cancelled)()) return {false, iteration - 1};
+      apply(S, system.damping);
+      const double curvature = dot(p_, q_);
+      if (!(curvature > 0)) return {iteration > 1, iteration};
+      const double alpha = rz / curvature;
+      axpy(alpha, p_, x);
+      axpy(-alpha, q_, r_);
+      const double before = model;
+      model += 0.5 * alpha * rz;
+      M.solve(r_.data(), z_.data());
+      const double rz_next = dot(r_, z_);
+      const bool small = iteration * (model - before) < system.forcing * model;
+      if (small || rz_next <= 1e-28 * rz_start) return {true, iteration};
+      scale_add(rz_next / rz, z_, p_);
+      rz = rz_next;
+    }
+    return {true, kMaxIterations};
+  }
+
+  std::uint64_t bytes() const;
+
+ private:
+  static constexpr int kMaxIterations = 500;
+
+  void start(const double* b, Buffer<double>& x);
+  void apply(ImageOperator& S, const double* damping);
+  static void copy(const Buffer<double>& from, Buffer<double>& to);
+  static double dot(const Buffer<double>& a, const Buffer<double>& b);
+  static void axpy(double alpha, const Buffer<double>& x, Buffer<double>& y);
+  /// p <- z + beta p
+  static void scale_add(double beta, const Buffer<double>& z, Buffer<double>& p);
+
+  const Columns& columns_;
+  Buffer<double> r_, z_, p_, q_, image_x_, image_y_;
+};
+
+}  // namespace sheaf

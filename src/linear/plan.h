@@ -1,0 +1,49 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "linear/columns.h"
+#include "residual/batches.h"
+
+namespace sheaf {
+
+/// How the camera system is solved.
+enum class SolverKind { blocks, dense, explicit_cg, implicit_cg };
+
+/// "blocks", "dense", "iterative-explicit", "iterative-implicit".
+const char* to_string(SolverKind kind);
+
+/// What decides how much a solver costs; counted before it allocates anything.
+struct WorkCounts {
+  std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
+  std::uint64_t pairs = 0;  ///< of observations of one point: products to form S
+  std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
+  std::uint32_t longest_track = 0;
+  bool images_couple = true;  ///< some free point or shared lens couples images
+
+  static constexpr std::uint64_t kExactImages = 20000;
+};
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held);
+
+/// A solver and, in one line, why it was taken.
+struct Plan {
+  SolverKind kind = SolverKind::dense;
+  std::string reason;
+};
+
+/// The cheapest by a model of flops and bytes per step: a pure function of the counts.
+Plan plan_solver(const WorkCounts& counts);
+
+/// The cheaper of the two iterative ones.
+SolverKind cheaper_iterative(const WorkCounts& counts);
+
+/// Bytes that the system will hold with this solver, what the batches hold included.
+std::uint64_t forecast_bytes(const WorkCounts& counts, SolverKind kind, int threads);
+
+/// Slices whose sums are kept apart: about equal work, few enough that their sums cost little.
+int count_slices(double flops, std::uint64_t tiles, std::uint64_t images);
+
+}  // namespace sheaf

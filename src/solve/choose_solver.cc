@@ -1,0 +1,71 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solve/choose_solver.h"
+
+#include <string>
+
+#include "linear/chunks.h"
+
+namespace sheaf {
+namespace {
+
+Plan asked_for(const WorkCounts& counts, CameraSolverKind kind) {
+  const std::string asked = "as asked";
+  const Plan plan = plan_solver(counts);
+  switch (kind) {
+    case CameraSolverKind::automatic:
+      return plan;
+    case CameraSolverKind::dense:
+      return {SolverKind::dense, asked};
+    case CameraSolverKind::iterative_explicit:
+      return {SolverKind::explicit_cg, asked};
+    case CameraSolverKind::iterative_implicit:
+      return {SolverKind::implicit_cg, asked};
+    case CameraSolverKind::iterative:
+      break;
+  }
+  return {cheaper_iterative(counts), asked + ", " + plan.reason};
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 999999) / 1000000) + " MB";
+}
+
+}  // namespace
+
+Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
+                             std::uint64_t resident_bytes) {
+  Choice choice{asked_for(counts, options.solver), 0};
+  const bool forms_pairs =
+      choice.plan.kind == SolverKind::dense || choice.plan.kind == SolverKind::explicit_cg;
+  if (forms_pairs && counts.longest_track > Chunks::kLongestTrack)
+    return Error(ErrorCode::usage, "a point is seen " + std::to_string(counts.longest_track) +
+                                       " times; solvers that form the camera matrix take at most " +
+                                       std::to_string(Chunks::kLongestTrack) +
+                                       ": use the implicit iterative solver");
+  const auto forecast = [&](SolverKind kind) {
+    return resident_bytes + forecast_bytes(counts, kind, threads);
+  };
+  choice.forecast_bytes = forecast(choice.plan.kind);
+  if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
+    return choice;
+  const std::uint64_t lean = forecast(SolverKind::implicit_cg);
+  if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
+      lean <= options.memory_limit_bytes) {
+    choice.plan = {SolverKind::implicit_cg, std::string(to_string(choice.plan.kind)) +
+                                                " would need " + megabytes(choice.forecast_bytes) +
+                                                ", over the limit of " +
+                                                megabytes(options.memory_limit_bytes)};
+    choice.forecast_bytes = lean;
+    return choice;
+  }
+  return Error(ErrorCode::memory_limit,
+               "the solver would need " + megabytes(choice.forecast_bytes) +
+                   ", over the limit of " + megabytes(options.memory_limit_bytes) +
+                   "; nothing was allocated" +
+                   (lean < choice.forecast_bytes
+                        ? " (the leanest solver, iterative-implicit, needs " + megabytes(lean) + ")"
+                        : ""));
+}
+
+}  // namespace sheaf

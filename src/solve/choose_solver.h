@@ -1,0 +1,21 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "linear/plan.h"
+#include "sheaf/error.h"
+#include "sheaf/options.h"
+
+namespace sheaf {
+
+/// The solver asked for, or the one that the counts recommend; under a memory limit the leanest
+/// that fits. `resident_bytes`: what the process holds already. Errors: ErrorCode::memory_limit
+/// when none fits, ErrorCode::usage when the one asked for cannot solve the problem.
+struct Choice {
+  Plan plan;
+  std::uint64_t forecast_bytes = 0;  ///< of the process
+};
+Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
+                             std::uint64_t resident_bytes);
+
+}  // namespace sheaf
