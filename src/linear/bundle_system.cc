@@ -10,7 +10,11 @@ namespace sheaf {
 
 namespace {
 
-ChunkLists lists_for(SolverKind kind) {
+/// Points that are held couple no images: no pairs. Lists number records with 16 bits, too few for
+/// the longest tracks: sums then run over the records in their own order.
+ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_track) {
+  if (points_held)
+    return longest_track > Chunks::kLongestTrack ? ChunkLists::none : ChunkLists::diagonal;
   switch (kind) {
     case SolverKind::dense:
     case SolverKind::explicit_cg:
@@ -34,7 +38,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       threads_(threads),
       batches_(std::move(batches)),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              points_held ? ChunkLists::diagonal : lists_for(kind))),
+                              lists_for(kind, points_held, batches_.longest_track))),
       columns_(std::move(columns)) {
   fill_state(problem);
   const std::size_t slices = chunks_.slices.size() - 1;

@@ -72,15 +72,16 @@ inline void diagonal_in_order(const Batches& batches, const Chunk& chunk, const 
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     const Batches::Group group = batches.groups[g];
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-      std::uint16_t records[8];
-      for (std::uint32_t l = 0; l < 8; ++l)
-        records[l] = static_cast<std::uint16_t>(8 * (b - chunk.first_batch) + l);
+      // Counted from the batch: from the chunk, a long track's would not fit into 16 bits.
+      constexpr std::uint16_t kRecords[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+      const double* T = from.T + kTRecord * 8 * (b - chunk.first_batch);
+      const double* C = from.C + kCRecord * 8 * (b - chunk.first_batch);
       const bool uniform = batches.uniform[b] >= 0;
       const std::uint32_t count = uniform ? group.lanes : 1;
       for (std::uint32_t l = 0; l < group.lanes; l += count) {
         double* to = sums + kDiagonalDoubles * batches.image[8 * b + l];
-        for (int p = 0; p < kParts; ++p) diagonal_part(records + l, count, p, from.T, from.C, to);
-        diagonal_corner(records + l, count, from.T, to);
+        for (int p = 0; p < kParts; ++p) diagonal_part(kRecords + l, count, p, T, C, to);
+        diagonal_corner(kRecords + l, count, T, to);
       }
     }
   }
