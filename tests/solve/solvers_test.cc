@@ -1,0 +1,153 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Every camera solver reaches what the dense one reaches, on scenes with every oddity.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <string>
+
+#include "sheaf/solve.h"
+#include "solve/scenes.h"
+
+namespace sheaf {
+namespace {
+
+struct Case {
+  CameraSolverKind solver;
+  const char* name;
+};
+
+class Solvers : public testing::TestWithParam<Case> {
+ protected:
+  static SolveOptions tight() {
+    SolveOptions options;
+    options.tolerance = 1e-13;
+    options.max_iterations = 200;
+    return options;
+  }
+
+  void expect_same_optimum(const Problem& start, const Fixed& fixed = {}) {
+    SolveOptions options = tight();
+    options.fixed = fixed;
+    options.solver = CameraSolverKind::dense;
+    Problem reference = start;
+    const double expected = solve(reference, options).final_cost;
+    options.solver = GetParam().solver;
+    Problem problem = start;
+    const Summary s = solve(problem, options);
+    EXPECT_TRUE(s.usable()) << s.words;
+    EXPECT_NEAR(s.final_cost, expected, 1e-8 * expected);
+    EXPECT_LT(scaled_gradient(problem, fixed), 1e-3 * scaled_gradient(start, fixed));
+  }
+};
+
+Fixed points_held() {
+  Fixed fixed;
+  fixed.points = true;
+  return fixed;
+}
+
+TEST_P(Solvers, AgreeOnAScene) {
+  const Scene scene = small_scene();
+  expect_same_optimum(scene.start);
+  Fixed distortion;
+  distortion.k1 = distortion.k2 = true;
+  distortion.pose_ids = {3};
+  expect_same_optimum(scene.start, distortion);
+  Problem on_true_points = scene.start;
+  on_true_points.points = scene.truth.points;
+  expect_same_optimum(on_true_points, points_held());
+}
+
+TEST_P(Solvers, AgreeOnSharedLenses) {
+  for (std::uint32_t together : {2u, 12u})
+    for (bool keep_unused : {false, true}) {
+      Scene scene = shared_lens_scene(together, keep_unused);
+      expect_same_optimum(scene.start);
+      scene.start.points = scene.truth.points;
+      expect_same_optimum(scene.start, points_held());
+    }
+}
+
+TEST_P(Solvers, AgreeWhereOneImageSeesAPointTwice) {
+  Problem problem = small_scene().start;
+  for (std::size_t i = 0; i < 400; i += 7)
+    problem.add_observation(problem.observation_image[i], problem.observation_point[i],
+                            problem.observation_xy[2 * i] + 0.4, problem.observation_xy[2 * i + 1]);
+  expect_same_optimum(problem);
+}
+
+TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
+  SceneOptions scene;
+  scene.images = 40;
+  scene.points = 9000;
+  scene.mean_track = 5;
+  const Problem start = generate(scene).value().start;
+  SolveOptions options;
+  options.solver = GetParam().solver;
+  options.max_iterations = 4;
+  options.threads = 1;
+  Problem expected = start;
+  const Summary reference = solve(expected, options);
+  EXPECT_LT(reference.final_cost, reference.initial_cost);
+  for (int threads : {2, 5, 16}) {
+    options.threads = threads;
+    Problem problem = start;
+    EXPECT_EQ(solve(problem, options).final_cost, reference.final_cost) << threads << " threads";
+    EXPECT_EQ(problem.points, expected.points) << threads << " threads";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Camera, Solvers,
+                         testing::Values(Case{CameraSolverKind::dense, "Dense"},
+                                         Case{CameraSolverKind::iterative, "Iterative"},
+                                         Case{CameraSolverKind::iterative_explicit, "Explicit"},
+                                         Case{CameraSolverKind::iterative_implicit, "Implicit"}),
+                         [](const auto& info) { return info.param.name; });
+
+/// The scene with its first point seen `times` more, half a pixel apart.
+Problem with_long_track(int times) {
+  Problem problem = small_scene().start;
+  for (int i = 0; i < times; ++i) {
+    const std::size_t of = static_cast<std::size_t>(i) % 2;
+    problem.add_observation(problem.observation_image[of], problem.observation_point[of],
+                            problem.observation_xy[2 * of] + 0.5 * (i % 3 - 1),
+                            problem.observation_xy[2 * of + 1]);
+  }
+  return problem;
+}
+
+// Beyond what the 16-bit record numbers of a chunk can tell apart.
+TEST(OverlongTrack, IsSolvedOrRefusedNeverMiscounted) {
+  const Problem start = with_long_track(9000);
+  for (bool held : {false, true})
+    for (const Case& c : {Case{CameraSolverKind::automatic, "automatic"},
+                          Case{CameraSolverKind::iterative, "iterative"},
+                          Case{CameraSolverKind::iterative_implicit, "implicit"},
+                          Case{CameraSolverKind::iterative_explicit, "explicit"},
+                          Case{CameraSolverKind::dense, "dense"}}) {
+      SCOPED_TRACE(std::string(c.name) + (held ? ", points held" : ""));
+      SolveOptions options;
+      options.tolerance = 1e-13;
+      options.max_iterations = 100;
+      options.solver = c.solver;
+      options.fixed.points = held;
+      Problem problem = start;
+      const Result<Summary> s = try_solve(problem, options);
+      if (!s.ok()) {  // said, and nothing was touched
+        EXPECT_EQ(s.error().code(), ErrorCode::usage);
+        EXPECT_NE(std::string(s.error().what()).find("90"), std::string::npos) << s.error().what();
+        EXPECT_EQ(problem.points, start.points);
+        EXPECT_TRUE(c.solver == CameraSolverKind::dense ||
+                    c.solver == CameraSolverKind::iterative_explicit)
+            << s.error().what();
+        continue;
+      }
+      EXPECT_LT(scaled_gradient(problem, options.fixed, 5),
+                1e-3 * scaled_gradient(start, options.fixed, 5));
+    }
+}
+
+}  // namespace
+}  // namespace sheaf
