@@ -35,7 +35,7 @@ enum class CameraSolverKind {
 struct SolveOptions {
   int max_iterations = 50;  ///< trust region steps tried, rejected ones included
   double tolerance = 1e-8;  ///< stop when the relative cost decrease stays below this twice
-  double gradient_tolerance = 1e-10;  ///< stop when the scaled gradient is below this x its start
+  double gradient_tolerance = 1e-10;  ///< stop when the scaled gradient is at most this x |r|
   double time_limit_s = std::numeric_limits<double>::infinity();  ///< set-up included
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
