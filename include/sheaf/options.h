@@ -39,17 +39,17 @@ struct SolveOptions {
   double time_limit_s = std::numeric_limits<double>::infinity();  ///< set-up included
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
-  Fixed fixed;
+  Fixed fixed{};
   CameraSolverKind solver = CameraSolverKind::automatic;
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   double initial_damping = 0;            ///< 0: the default rule
   Simd simd = Simd::best;                ///< for tests and measurements
 
   /// Called once the solver is chosen and before it allocates: solver, reason and forecast are set.
-  std::function<void(const Summary&)> on_plan;
+  std::function<void(const Summary&)> on_plan{};
   /// Called after the start was evaluated (index 0) and after every step; return false to stop.
-  std::function<bool(const Iteration&)> on_iteration;
-  std::stop_token stop;  ///< asks the solver to end within one evaluation
+  std::function<bool(const Iteration&)> on_iteration{};
+  std::stop_token stop{};  ///< asks the solver to end within one evaluation
 };
 
 }  // namespace sheaf
