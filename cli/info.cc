@@ -9,6 +9,7 @@
 #include "inspect/statistics.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "platform/memory.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -65,7 +66,7 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   fmt::print("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
              statistics.track.min, statistics.track.max, statistics.mean_track);
   fmt::print("memory      {} bytes for the problem, {} bytes at most for the process\n",
-             size_bytes(input.problem), peak_bytes());
+             size_bytes(input.problem), peak_resident_bytes());
   print_histogram(statistics);
 }
 
@@ -84,7 +85,7 @@ int run(const Arguments& arguments) {
   document["rms_px"] = number(evaluation.rms_px);
   document["behind_camera"] = observations_json(evaluation.behind, input.problem);
   document["not_finite"] = observations_json(evaluation.not_finite, input.problem);
-  document["memory"] = {{"problem_bytes", size_bytes(input.problem)}, {"peak_bytes", peak_bytes()}};
+  document["memory"] = {{"problem_bytes", size_bytes(input.problem)}, {"peak_bytes", peak_resident_bytes()}};
   document["time"] = {{"read_s", input.read_s}, {"total_s", total.seconds()}};
   write_json(document, json);
   return 0;

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "json_document.h"
 
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "inspect/statistics.h"
+#include "platform/memory.h"
 #include "io/output_file.h"
 
 namespace sheaf {
@@ -114,7 +114,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
           {"precision", s.precision},
           {"simd", s.simd},
           {"threads", s.threads},
-          {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_bytes()}}},
+          {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_resident_bytes()}}},
           {"initial_cost", number(s.initial_cost)},
           {"final_cost", number(s.final_cost)},
           {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
@@ -132,12 +132,6 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
            {{"before", observations_json(record.before.behind, problem)},
             {"after", observations_json(record.after.behind, problem)}}},
           {"rejected_observations", observations_json(s.rejected_observations, problem)}};
-}
-
-std::uint64_t peak_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
 void write_json(const Json& document, const std::string& path) {

@@ -38,8 +38,6 @@ struct SolveRecord {
 };
 Json solve_json(const SolveRecord& record, const Summary& summary, const Problem& problem);
 
-/// Peak resident size of this process.
-std::uint64_t peak_bytes();
 
 /// Appears whole or not at all. Throws Error (ErrorCode::unwritable_output).
 void write_json(const Json& document, const std::string& path);

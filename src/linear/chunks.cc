@@ -170,10 +170,10 @@ void list_pairs(const Batches& batches, const TileNumbers& numbers, Chunk& chunk
 std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_images) {
   std::vector<double> work{0};
   for (const Chunk& chunk : c.chunks) {
-    double flops = 8.0 * 700 * static_cast<double>(chunk.end_batch - chunk.first_batch);
+    std::uint64_t pairs = 0;
     for (std::uint64_t r = chunk.first_pair_run; r < chunk.end_pair_run; ++r)
-      flops += 490.0 * c.pair_runs[r].count;
-    work.push_back(work.back() + flops);
+      pairs += c.pair_runs[r].count;
+    work.push_back(work.back() + linearize_flops(chunk.end_batch - chunk.first_batch, pairs));
   }
   const int count = count_slices(work.back(), c.tiles.size(), num_images);
   std::vector<std::uint32_t> slices{0};

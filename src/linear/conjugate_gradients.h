@@ -50,7 +50,8 @@ class ConjugateGradients {
       model += 0.5 * alpha * rz;
       M.solve(r_.data(), z_.data());
       const double rz_next = dot(r_, z_);
-      const bool small = iteration * (model - before) < system.forcing * model;
+      const bool small =
+          iteration >= kMinIterations && iteration * (model - before) < system.forcing * model;
       if (small || rz_next <= 1e-28 * rz_start) return {true, iteration};
       scale_add(rz_next / rz, z_, p_);
       rz = rz_next;
@@ -62,6 +63,9 @@ class ConjugateGradients {
 
  private:
   static constexpr int kMaxIterations = 500;
+  /// The first few parts of the decrease can be small by chance: stopping at two of them cost
+  /// trafalgar-like scenes a trust region step.
+  static constexpr int kMinIterations = 6;
 
   void start(const double* b, Buffer<double>& x);
   void apply(ImageOperator& S, const double* damping);

@@ -117,6 +117,10 @@ SolverKind cheaper_iterative(const WorkCounts& c) {
                                                             : SolverKind::implicit_cg;
 }
 
+double linearize_flops(std::uint64_t batches, std::uint64_t pairs) {
+  return 8.0 * 700 * static_cast<double>(batches) + 490.0 * static_cast<double>(pairs);
+}
+
 int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
   constexpr double kFlopsPerSlice = 15e6, kBytes = 96e6;
   const double sums = 8.0 * (kTileDoubles * static_cast<double>(tiles) +
@@ -128,7 +132,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) 
   const bool pairs = kind == SolverKind::dense || kind == SolverKind::explicit_cg;
   const std::uint64_t tiles = pairs ? c.tiles : 0;
   const auto slices = static_cast<std::uint64_t>(
-      count_slices(700.0 * static_cast<double>(c.observations), tiles, c.images));
+      count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
   std::uint64_t sum = c.batches * (32 + 4 + 128) + c.groups * (16 + 32);
   sum += c.groups * 8 * (2 * kPointGroup + kFactorGroup);
   sum += c.images * (8 * 2 * kCameraRecord + 2 * 56 + 2 * 24 + 36 + 4) + 5 * 8 * c.columns;

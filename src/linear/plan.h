@@ -43,7 +43,11 @@ SolverKind cheaper_iterative(const WorkCounts& counts);
 /// Bytes that the system will hold with this solver, what the batches hold included.
 std::uint64_t forecast_bytes(const WorkCounts& counts, SolverKind kind, int threads);
 
+/// Flops to linearise so many batches and to multiply so many pairs.
+double linearize_flops(std::uint64_t batches, std::uint64_t pairs);
+
 /// Slices whose sums are kept apart: about equal work, few enough that their sums cost little.
+/// flops: of one linearisation, by linearize_flops.
 int count_slices(double flops, std::uint64_t tiles, std::uint64_t images);
 
 }  // namespace sheaf

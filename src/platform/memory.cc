@@ -19,6 +19,16 @@ std::uint64_t resident_bytes() {
 }
 
 std::uint64_t peak_resident_bytes() {
+  // VmHWM first: ru_maxrss survives exec, so a small program started by a large one inherits it.
+  if (std::FILE* file = std::fopen("/proc/self/status", "r")) {
+    char line[256];
+    unsigned long long kilobytes = 0;
+    bool found = false;
+    while (!found && std::fgets(line, sizeof line, file) != nullptr)
+      found = std::sscanf(line, "VmHWM: %llu kB", &kilobytes) == 1;
+    std::fclose(file);
+    if (found) return kilobytes * 1024;
+  }
   rusage usage{};
   if (getrusage(RUSAGE_SELF, &usage) != 0) return 0;
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;

@@ -94,7 +94,10 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
                       threads);
   if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
   summary.setup_s = clock.seconds();
-  minimize(system, options, clock, summary);
+  SolveOptions resolved = options;
+  if (resolved.initial_damping == 0)
+    resolved.initial_damping = default_damping(problem.num_images());
+  minimize(system, resolved, clock, summary);
   system.store(problem);
   summary.solve_s = clock.seconds() - summary.setup_s;
   if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
