@@ -30,15 +30,16 @@ HWY_INLINE void outer8(const double* x, V loaded, V v, V* a) {
   a[7] = fma(broadcast<7>(x, loaded), v, a[7]);
 }
 
-/// Columns [8 part / kParts, ...) of one image's diagonal block, and its right-hand side.
+/// Columns of this part of one image's diagonal block, and of its right-hand side. The squares of
+/// the ninths (T in lanes 0..2, C in lanes 4 and 5) go to `ninths`.
 HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count, int part,
-                              const double* T, const double* C, double* sums) {
+                              const Records& from, double* sums, double* ninths) {
   const int column = part * kLanes;
-  V a[8], a8 = zero(), rhs = zero(), squares = zero();
+  V a[8], a8 = zero(), rhs = zero(), squares = zero(), ninth = zero();
   for (V& x : a) x = zero();
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double* c = C + kCRecord * records[i];
-    const double* t = T + kTRecord * records[i];
+    const double* c = from.C + kCRecord * records[i];
+    const double* t = from.T + kTRecord * records[i];
     const V c0 = load(c + column), c1 = load(c + 8 + column);
     outer8(c, c0, c0, a);
     outer8(c + 8, c1, c1, a);
@@ -46,24 +47,28 @@ HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count,
     rhs = fma(set(t[30]), c0, fma(set(t[31]), c1, rhs));
     const V t0 = load(t + column), t1 = load(t + 8 + column), t2 = load(t + 16 + column);
     squares = fma(t0, t0, fma(t1, t1, fma(t2, t2, squares)));
+    const V last = load(t + 24 + column);
+    ninth = fma(last, last, ninth);
   }
   for (int k = 0; k < 8; ++k) add_to(a[k], sums + 8 * k + column);
   add_to(a8, sums + 64 + column);
   add_to(rhs, sums + 72 + column);
   add_to(squares, sums + 80 + column);
+  store(ninth, ninths + column);
 }
 
-/// The ninth column's own entries: (8, 8), its right-hand side, its squares of T.
-HWY_INLINE void diagonal_corner(const std::uint16_t* records, std::uint32_t count, const double* T,
-                                double* sums) {
-  double corner = 0, rhs = 0, squares = 0;
+HWY_INLINE void diagonal_run(const std::uint16_t* records, std::uint32_t count,
+                             const Records& from, double* sums) {
+  alignas(64) double ninths[8];
+  for (int p = 0; p < kParts; ++p) diagonal_part(records, count, p, from, sums, ninths);
+  double rhs = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double* t = T + kTRecord * records[i] + 24;
-    corner += t[4] * t[4] + t[5] * t[5];
-    rhs += t[4] * t[6] + t[5] * t[7];
-    squares += t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
+    const double* last = from.T + kTRecord * records[i] + 24;
+    rhs += last[4] * last[6] + last[5] * last[7];
   }
-  sums[88] += corner, sums[89] += rhs, sums[90] += squares;
+  sums[88] += ninths[4] + ninths[5];
+  sums[89] += rhs;
+  sums[90] += ninths[0] + ninths[1] + ninths[2];
 }
 
 /// Without lists: the records in their own order, eight at a time where one image has all lanes.
@@ -74,14 +79,13 @@ inline void diagonal_in_order(const Batches& batches, const Chunk& chunk, const 
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
       // Counted from the batch: from the chunk, a long track's would not fit into 16 bits.
       constexpr std::uint16_t kRecords[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-      const double* T = from.T + kTRecord * 8 * (b - chunk.first_batch);
-      const double* C = from.C + kCRecord * 8 * (b - chunk.first_batch);
+      const std::uint64_t record = 8 * (b - chunk.first_batch);
+      const Records batch{from.T + kTRecord * record, from.C + kCRecord * record, nullptr};
       const bool uniform = batches.uniform[b] >= 0;
       const std::uint32_t count = uniform ? group.lanes : 1;
       for (std::uint32_t l = 0; l < group.lanes; l += count) {
         double* to = sums + kDiagonalDoubles * batches.image[8 * b + l];
-        for (int p = 0; p < kParts; ++p) diagonal_part(kRecords + l, count, p, T, C, to);
-        diagonal_corner(kRecords + l, count, T, to);
+        diagonal_run(kRecords + l, count, batch, to);
       }
     }
   }
@@ -92,18 +96,17 @@ inline void diagonal_products(const Batches& batches, const Chunks& chunks, cons
   if (chunks.diagonal.empty()) return diagonal_in_order(batches, chunk, from, sums);
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun run = chunks.diagonal_runs[i];
-    const std::uint16_t* records = &chunks.diagonal[run.first];
-    double* to = sums + kDiagonalDoubles * run.image;
-    for (int p = 0; p < kParts; ++p) diagonal_part(records, run.count, p, from.T, from.C, to);
-    diagonal_corner(records, run.count, from.T, to);
+    diagonal_run(&chunks.diagonal[run.first], run.count, from,
+                 sums + kDiagonalDoubles * run.image);
   }
 }
 
-/// tile += sum T_a T_b^T, columns of this part (and rows of this part of the ninth column).
+/// tile += sum T_a T_b^T, columns of this part (and rows of this part of the ninth column). The
+/// ninths' own products, of which lanes 0..2 are wanted, go to `corner`.
 HWY_INLINE void pair_part(const RecordPair* pairs, std::uint32_t count, int part, const double* T,
-                          double* tile) {
+                          double* tile, double* corner) {
   const int column = part * kLanes;
-  V a[8], a8 = zero(), a9 = zero();
+  V a[8], a8 = zero(), a9 = zero(), ninths = zero();
   for (V& x : a) x = zero();
   for (std::uint32_t i = 0; i < count; ++i) {
     const double* ti = T + kTRecord * pairs[i].a;
@@ -114,21 +117,12 @@ HWY_INLINE void pair_part(const RecordPair* pairs, std::uint32_t count, int part
       a8 = fma(set(ti[24 + q]), vj, a8);
       a9 = fma(set(tj[24 + q]), vi, a9);
     }
+    ninths = fma(load(ti + 24 + column), load(tj + 24 + column), ninths);
   }
   for (int k = 0; k < 8; ++k) add_to(a[k], tile + 8 * k + column);
   add_to(a8, tile + 64 + column);
   add_to(a9, tile + 72 + column);
-}
-
-HWY_INLINE void pair_corner(const RecordPair* pairs, std::uint32_t count, const double* T,
-                            double* tile) {
-  double corner = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double* ti = T + kTRecord * pairs[i].a + 24;
-    const double* tj = T + kTRecord * pairs[i].b + 24;
-    corner += ti[0] * tj[0] + ti[1] * tj[1] + ti[2] * tj[2];
-  }
-  tile[80] += corner;
+  store(ninths, corner + column);
 }
 
 inline void pair_products(const Chunks& chunks, const Chunk& chunk, const Records& from,
@@ -137,8 +131,9 @@ inline void pair_products(const Chunks& chunks, const Chunk& chunk, const Record
     const PairRun run = chunks.pair_runs[i];
     const RecordPair* pairs = &chunks.pairs[run.first];
     double* tile = tiles + kTileDoubles * run.tile;
-    for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, from.T, tile);
-    pair_corner(pairs, run.count, from.T, tile);
+    alignas(64) double corner[8];
+    for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, from.T, tile, corner);
+    tile[80] += corner[0] + corner[1] + corner[2];
   }
 }
 

@@ -105,6 +105,7 @@ HWY_INLINE LaneJacobian linearize_lanes(const V* c, V X0, V X1, V X2, V zx, V zy
 
 /// 1 in lanes below `lanes`, 0 beyond, for the part that starts at lane `first`.
 HWY_INLINE V lane_mask(std::uint32_t lanes, int first) {
+  if (lanes == 8) return set(1.0);
   alignas(64) double ones[8];
   for (int l = 0; l < kLanes; ++l)
     ones[l] = static_cast<std::uint32_t>(first + l) < lanes ? 1.0 : 0.0;
