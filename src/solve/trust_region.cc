@@ -132,9 +132,12 @@ class Loop {
     // Below the cost's own rounding a decrease cannot be seen.
     const double predicted = std::abs((cost_ - it.trial_cost) / it.gain_ratio);
     const bool invisible = finite && predicted < 4 * std::numeric_limits<double>::epsilon() * cost_;
-    if (invisible || (finite && it.step_norm < kRounding) || exhausted)
+    if (invisible || (finite && it.step_norm < kRounding) || (exhausted && finite))
       end(Termination::step_converged,
           "converged: no step changes the cost by more than its rounding");
+    else if (exhausted)
+      end(Termination::step_converged,
+          "stopped: no step from here leads to a finite cost, however strong the damping");
   }
 
   bool gradient_vanished(const Step& step) {
