@@ -22,6 +22,7 @@ const std::map<std::string, Cheirality> kCheiralities = {{"formula", Cheirality:
 const std::map<std::string, CameraSolverKind> kSolvers = {
     {"auto", CameraSolverKind::automatic},
     {"dense", CameraSolverKind::dense},
+    {"sparse", CameraSolverKind::sparse},
     {"iterative", CameraSolverKind::iterative},
     {"iterative-explicit", CameraSolverKind::iterative_explicit},
     {"iterative-implicit", CameraSolverKind::iterative_implicit}};
@@ -111,10 +112,12 @@ void add_solve_options(CLI::App& verb, SolveArguments& a) {
           ""));
   verb.add_option("--solver", a.solver,
                   "how the camera system is solved: auto (by counted work), dense (formed, "
-                  "Cholesky), iterative (conjugate gradients; iterative-explicit on the formed "
-                  "blocks, iterative-implicit with nothing formed)")
+                  "Cholesky), sparse (formed by blocks, Cholesky in an order that keeps fill low), "
+                  "iterative (conjugate gradients; iterative-explicit on the formed blocks, "
+                  "iterative-implicit with nothing formed)")
       ->type_name("NAME")
-      ->check(one_of({"auto", "dense", "iterative", "iterative-explicit", "iterative-implicit"}))
+      ->check(one_of(
+          {"auto", "dense", "sparse", "iterative", "iterative-explicit", "iterative-implicit"}))
       ->capture_default_str();
   verb.add_option("--memory-limit", a.memory_limit_bytes,
                   "take a leaner solver, or refuse (exit 5), rather than exceed this many bytes; "

@@ -27,6 +27,7 @@ enum class Simd { best, scalar, sse4, avx2, avx512 };
 enum class CameraSolverKind {
   automatic,           ///< the cheapest by counted flops and bytes
   dense,               ///< formed, dense Cholesky
+  sparse,              ///< formed by blocks, sparse Cholesky
   iterative,           ///< conjugate gradients, explicit or implicit by counted flops and bytes
   iterative_explicit,  ///< conjugate gradients on the formed blocks
   iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed

@@ -17,6 +17,7 @@ ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_tr
     return longest_track > Chunks::kLongestTrack ? ChunkLists::none : ChunkLists::diagonal;
   switch (kind) {
     case SolverKind::dense:
+    case SolverKind::sparse:
     case SolverKind::explicit_cg:
       return ChunkLists::pairs;
     case SolverKind::blocks:
@@ -55,6 +56,9 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       break;
     case SolverKind::dense:
       solver_ = make_dense_solver(columns_, kernels, threads);
+      break;
+    case SolverKind::sparse:
+      solver_ = make_sparse_solver(columns_, chunks_, kernels, threads);
       break;
     case SolverKind::explicit_cg:
       solver_ = make_explicit_solver(columns_, chunks_, threads);

@@ -60,6 +60,10 @@ class CameraSolver {
 std::unique_ptr<CameraSolver> make_dense_solver(const Columns& columns, const Kernels& kernels,
                                                 Threads& threads);
 
+/// S stored by supernodes in an order that keeps fill low, and factored there.
+std::unique_ptr<CameraSolver> make_sparse_solver(const Columns& columns, const Chunks& chunks,
+                                                 const Kernels& kernels, Threads& threads);
+
 /// One small system for each image: exact where images do not couple (points held, own lenses).
 std::unique_ptr<CameraSolver> make_block_solver(const Columns& columns, Threads& threads);
 

@@ -60,6 +60,41 @@ void update(double* A, std::size_t lda, std::size_t k, std::size_t depth, std::s
   for (; c < c_end; ++c) update_columns<1>(A, lda, k, depth, first, end, c);
 }
 
+template <int Tall, int Wide>
+HWY_INLINE void product_tile(double* C, std::size_t ldc, const double* rows, const double* columns,
+                             std::size_t lda, std::size_t depth) {
+  V acc[Wide][Tall];
+  for (int j = 0; j < Wide; ++j)
+    for (int i = 0; i < Tall; ++i) acc[j][i] = zero();
+  for (std::size_t l = 0; l < depth; ++l) {
+    V a[Tall];
+    for (int i = 0; i < Tall; ++i) a[i] = load(rows + l * lda + i * kLanes);
+    for (int j = 0; j < Wide; ++j) {
+      const V b = set(columns[l * lda + j]);
+      for (int i = 0; i < Tall; ++i) acc[j][i] = fma(a[i], b, acc[j][i]);
+    }
+  }
+  for (int j = 0; j < Wide; ++j)
+    for (int i = 0; i < Tall; ++i) store(acc[j][i], C + j * ldc + i * kLanes);
+}
+
+template <int Wide>
+HWY_INLINE void product_columns(const double* P, std::size_t lda, std::size_t depth,
+                                std::size_t first, std::size_t end, std::size_t c, double* C,
+                                std::size_t ldc) {
+  std::size_t r = first;
+  for (; r + kTall * kLanes <= end; r += kTall * kLanes)
+    product_tile<kTall, Wide>(C + r - first, ldc, P + r, P + c, lda, depth);
+  for (; r < end; r += kLanes) product_tile<1, Wide>(C + r - first, ldc, P + r, P + c, lda, depth);
+}
+
+void product(const double* P, std::size_t lda, std::size_t depth, std::size_t first,
+             std::size_t end, std::size_t c, std::size_t c_end, double* C, std::size_t ldc) {
+  for (; c + kWide <= c_end; c += kWide, C += kWide * ldc)
+    product_columns<kWide>(P, lda, depth, first, end, c, C, ldc);
+  for (; c < c_end; ++c, C += ldc) product_columns<1>(P, lda, depth, first, end, c, C, ldc);
+}
+
 /// Columns [k, k + width), width <= 8, of rows [first, end): A <- A L^-T.
 HWY_INLINE void solve_narrow(double* A, std::size_t lda, std::size_t k, std::size_t width,
                              const double* inverse, std::size_t first, std::size_t end) {
@@ -141,7 +176,7 @@ void substitute(const double* A, std::size_t lda, std::size_t n, const double* i
 }
 
 DenseKernels table(const char* name) {
-  return {name, &factor_block, &solve_rows, &update, &substitute};
+  return {name, &factor_block, &solve_rows, &update, &product, &substitute};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "linear/kernels.h"
+#include "linear/sparse_cholesky.h"
 
 namespace sheaf {
 namespace {
 
-/// Distinct image pairs that share a point, by marking a triangular bitmap.
-std::uint64_t count_tiles(const Batches& batches, std::uint64_t images) {
+/// Distinct image pairs that share a point, by marking a triangular bitmap; listed as far as there
+/// is room for them in a list of kAnalysedTiles.
+std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list) {
   std::vector<std::uint64_t> marked((images * (images + 1) / 2 + 63) / 64, 0);
   std::vector<std::uint32_t> previous, set;
   std::uint64_t tiles = 0;
@@ -26,12 +28,29 @@ std::uint64_t count_tiles(const Batches& batches, std::uint64_t images) {
           const std::uint64_t at = std::uint64_t(set[i]) * (set[i] + 1) / 2 + set[j];
           std::uint64_t& word = marked[at / 64];
           const std::uint64_t bit = std::uint64_t(1) << (at % 64);
-          tiles += (word & bit) == 0;
+          if ((word & bit) != 0) continue;
           word |= bit;
+          if (++tiles <= WorkCounts::kAnalysedTiles)
+            list.push_back({std::max(set[i], set[j]), std::min(set[i], set[j])});
         }
       previous.swap(set);
     }
   return tiles;
+}
+
+void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& c) {
+  const auto n = static_cast<double>(c.columns);
+  c.sparse_flops = n * n * n / 3;
+  c.sparse_doubles = c.columns * (c.columns + 8);
+  c.sparse_bytes = 8 * c.sparse_doubles;
+  if (tiles.size() == c.tiles) {
+    const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
+    c.sparse_flops = symbolic.flops;
+    c.sparse_doubles = symbolic.panel_doubles;
+    c.sparse_bytes = SparseCholesky::bytes(symbolic);
+  }
+  // The way of each tile into the factor, listed and sorted; several where lenses are shared.
+  c.sparse_bytes += (columns.lens_shared ? 4 : 1) * (24 + 28) * (c.tiles + c.images);
 }
 
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
@@ -45,6 +64,13 @@ constexpr double kTypicalIterations = 25;
 double dense_seconds(const WorkCounts& c) {
   const double n = static_cast<double>(c.columns);
   return seconds(kPairNs * static_cast<double>(c.pairs) + n * n * n / 3 / kDenseFlopsPerNs);
+}
+/// Sparse factors run a little under the dense rate; their panels are also cleared, filled and read
+/// twice to substitute.
+constexpr double kSparseFlopsPerNs = 50, kSparseEntryNs = 2.5;
+double sparse_seconds(const WorkCounts& c) {
+  return seconds(kPairNs * static_cast<double>(c.pairs) + c.sparse_flops / kSparseFlopsPerNs +
+                 kSparseEntryNs * static_cast<double>(c.sparse_doubles));
 }
 double explicit_seconds(const WorkCounts& c) {
   const double blocks = 2 * static_cast<double>(c.tiles) + static_cast<double>(c.images);
@@ -67,6 +93,8 @@ const char* to_string(SolverKind kind) {
       return "blocks";
     case SolverKind::dense:
       return "dense";
+    case SolverKind::sparse:
+      return "sparse";
     case SolverKind::explicit_cg:
       return "iterative-explicit";
     case SolverKind::implicit_cg:
@@ -88,8 +116,10 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
   for (const Batches::Group& group : batches.groups)
     c.pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
   const std::uint64_t all = c.images * (c.images + 1) / 2;
-  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images)
+  std::vector<Tile> tiles;
+  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles)
                                                  : std::min(all, c.pairs);
+  count_sparse(columns, tiles, c);
   return c;
 }
 
@@ -97,14 +127,17 @@ Plan plan_solver(const WorkCounts& c) {
   if (!c.images_couple)
     return {SolverKind::blocks, "nothing free couples the images: one small system for each of " +
                                     std::to_string(c.images)};
-  const double dense = dense_seconds(c), explicit_cg = explicit_seconds(c),
-               implicit_cg = implicit_seconds(c);
+  const double dense = dense_seconds(c), sparse = sparse_seconds(c),
+               explicit_cg = explicit_seconds(c), implicit_cg = implicit_seconds(c);
   const std::string counts = std::to_string(c.images) + " images, " + std::to_string(c.tiles) +
                              " blocks, " + std::to_string(c.pairs) + " pairs";
   const std::string costs = ": about " + milliseconds(dense) + " a step dense, " +
-                            milliseconds(explicit_cg) + " iterative explicit, " +
-                            milliseconds(implicit_cg) + " iterative implicit";
+                            milliseconds(sparse) + " sparse, " + milliseconds(explicit_cg) +
+                            " iterative explicit, " + milliseconds(implicit_cg) +
+                            " iterative implicit";
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
+  if (sparse < dense && sparse <= explicit_cg && sparse <= implicit_cg && !too_long)
+    return {SolverKind::sparse, counts + costs};
   if (dense <= explicit_cg && dense <= implicit_cg && !too_long)
     return {SolverKind::dense, counts + costs};
   if (explicit_cg <= implicit_cg && !too_long) return {SolverKind::explicit_cg, counts + costs};
@@ -129,7 +162,7 @@ int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
 }
 
 std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) {
-  const bool pairs = kind == SolverKind::dense || kind == SolverKind::explicit_cg;
+  const bool pairs = kind != SolverKind::blocks && kind != SolverKind::implicit_cg;
   const std::uint64_t tiles = pairs ? c.tiles : 0;
   const auto slices = static_cast<std::uint64_t>(
       count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
@@ -142,9 +175,11 @@ std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) 
           46 * std::uint64_t(c.longest_track));
   if (pairs) sum += 4 * c.pairs + 8 * tiles + 6 * c.observations;
   if (kind == SolverKind::dense) sum += 8 * c.columns * (c.columns + 8);
+  if (kind == SolverKind::sparse) sum += c.sparse_bytes;
   if (kind == SolverKind::explicit_cg) sum += (2 * tiles + c.images) * (8 * 88 + 20);
   if (kind == SolverKind::implicit_cg) sum += slices * 8 * kProductRecord * c.images;
-  if (kind != SolverKind::dense) sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
+  if (kind != SolverKind::dense && kind != SolverKind::sparse)
+    sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
   return sum;
 }
 

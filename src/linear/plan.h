@@ -11,9 +11,9 @@
 namespace sheaf {
 
 /// How the camera system is solved.
-enum class SolverKind { blocks, dense, explicit_cg, implicit_cg };
+enum class SolverKind { blocks, dense, sparse, explicit_cg, implicit_cg };
 
-/// "blocks", "dense", "iterative-explicit", "iterative-implicit".
+/// "blocks", "dense", "sparse", "iterative-explicit", "iterative-implicit".
 const char* to_string(SolverKind kind);
 
 /// What decides how much a solver costs; counted before it allocates anything.
@@ -21,10 +21,14 @@ struct WorkCounts {
   std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
   std::uint64_t pairs = 0;  ///< of observations of one point: products to form S
   std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
+  /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
+  double sparse_flops = 0;
+  std::uint64_t sparse_doubles = 0, sparse_bytes = 0;
   std::uint32_t longest_track = 0;
   bool images_couple = true;  ///< some free point or shared lens couples images
 
   static constexpr std::uint64_t kExactImages = 20000;
+  static constexpr std::uint64_t kAnalysedTiles = 4000000;
 };
 WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held);
 

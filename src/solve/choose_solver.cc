@@ -17,6 +17,8 @@ Plan asked_for(const WorkCounts& counts, CameraSolverKind kind) {
       return plan;
     case CameraSolverKind::dense:
       return {SolverKind::dense, asked};
+    case CameraSolverKind::sparse:
+      return {SolverKind::sparse, asked};
     case CameraSolverKind::iterative_explicit:
       return {SolverKind::explicit_cg, asked};
     case CameraSolverKind::iterative_implicit:
@@ -37,7 +39,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
                              std::uint64_t resident_bytes) {
   Choice choice{asked_for(counts, options.solver), 0};
   const bool forms_pairs =
-      choice.plan.kind == SolverKind::dense || choice.plan.kind == SolverKind::explicit_cg;
+      choice.plan.kind != SolverKind::blocks && choice.plan.kind != SolverKind::implicit_cg;
   if (forms_pairs && counts.longest_track > Chunks::kLongestTrack)
     return Error(ErrorCode::usage, "a point is seen " + std::to_string(counts.longest_track) +
                                        " times; solvers that form the camera matrix take at most " +
