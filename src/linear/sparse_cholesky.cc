@@ -12,10 +12,15 @@ namespace sheaf {
 namespace {
 
 constexpr std::size_t kPanel = 32;
-/// Products are made in blocks of these sizes, which stay in the nearest caches.
-constexpr std::int32_t kRows = 192, kColumns = 32;
-/// Rows of a panel that one task of a shared factorisation owns.
-constexpr std::size_t kTaskRows = 96;
+/// Products are made in blocks of these sizes, which stay in the nearest cache.
+constexpr std::int32_t kRows = 96, kColumns = 32;
+/// Rows of a panel that are updated and solved while they stay in the second-level cache; one
+/// task's where threads share the panel.
+constexpr std::size_t kRowsAlone = 288, kRowsShared = 96;
+
+void subtract(const double* from, std::int32_t count, double* to) {
+  for (std::int32_t i = 0; i < count; ++i) to[i] -= from[i];
+}
 
 /// sum a[i] b[i] in eight lanes and a fixed tree.
 double dot(const double* a, const double* b, std::size_t n) {
@@ -146,59 +151,46 @@ bool SparseCholesky::factor(Threads& threads, const Fill& fill,
   threads.for_each(subtrees_.size(), [&](std::size_t t) {
     const std::int32_t root = subtrees_[t];
     for (std::int32_t s = symbolic_.supernodes[root].subtree; s <= root; ++s)
-      if (job.stops() || !factor_alone(s, job)) return job.failed.store(true);
+      if (job.stops() || !factor_supernode(s, job, false)) return job.failed.store(true);
   });
   for (std::int32_t s : above_)
-    if (job.stops() || !factor_shared(s, job)) return false;
+    if (job.stops() || !factor_supernode(s, job, true)) return false;
   return !job.failed;
 }
 
-bool SparseCholesky::factor_alone(std::size_t supernode, Job& job) {
+bool SparseCholesky::factor_supernode(std::size_t supernode, Job& job, bool shared) {
   const Supernode& s = symbolic_.supernodes[supernode];
   double* A = panels_.data() + s.panel;
   double* inverse = inverse_.data() + s.first;
   const auto width = static_cast<std::size_t>(s.width);
-  const std::size_t rows = s.rows_end();
-  std::memset(A, 0, s.lda * width * sizeof(double));
-  job.fill(supernode);
-  apply_updates(supernode, 0, rows, scratch_[job.threads.worker()].data());
-  for (std::size_t k = 0; k < width; k += kPanel) {
-    const std::size_t w = std::min(kPanel, width - k), below = k + w == width ? s.top : k + w;
-    if (!kernels_.factor_block(A, s.lda, k, w, inverse)) return false;
-    kernels_.solve_rows(A, s.lda, k, w, inverse, below, rows);
-    if (k + w < width) kernels_.update(A, s.lda, k, w, below, rows, below, width);
-  }
-  return true;
-}
-
-bool SparseCholesky::factor_shared(std::size_t supernode, Job& job) {
-  const Supernode& s = symbolic_.supernodes[supernode];
-  double* A = panels_.data() + s.panel;
-  double* inverse = inverse_.data() + s.first;
-  const auto width = static_cast<std::size_t>(s.width);
-  const std::size_t rows = s.rows_end();
-  const auto in_rows = [&](std::size_t from, const auto& task) {
-    job.threads.for_each((rows - from + kTaskRows - 1) / kTaskRows, [&](std::size_t t) {
-      const std::size_t first = from + t * kTaskRows;
-      task(first, std::min(rows, first + kTaskRows));
-    });
+  const auto in_rows = [&](std::size_t from, std::size_t to, const auto& task) {
+    const std::size_t step = shared ? kRowsShared : kRowsAlone,
+                      tasks = (to - from + step - 1) / step;
+    const auto run = [&](std::size_t t) {
+      const std::size_t first = from + t * step, end = std::min(to, first + step);
+      apply_updates(supernode, first, end, scratch_[job.threads.worker()].data());
+      task(first, end);
+    };
+    if (shared) return job.threads.for_each(tasks, run);
+    for (std::size_t t = 0; t < tasks; ++t) run(t);
   };
   std::memset(A, 0, s.lda * width * sizeof(double));
   job.fill(supernode);
-  in_rows(0, [&](std::size_t first, std::size_t end) {
-    apply_updates(supernode, first, end, scratch_[job.threads.worker()].data());
-  });
+  in_rows(0, s.top, [](std::size_t, std::size_t) {});
   for (std::size_t k = 0; k < width; k += kPanel) {
-    const std::size_t w = std::min(kPanel, width - k), below = k + w == width ? s.top : k + w;
+    const std::size_t w = std::min(kPanel, width - k), below = k + w;
     if (!kernels_.factor_block(A, s.lda, k, w, inverse)) return false;
-    in_rows(below, [&](std::size_t first, std::size_t end) {
-      kernels_.solve_rows(A, s.lda, k, w, inverse, first, end);
-    });
-    if (k + w == width) break;
-    in_rows(below, [&](std::size_t first, std::size_t end) {
-      kernels_.update(A, s.lda, k, w, first, end, below, std::min(width, end));
-    });
+    if (below == width) break;
+    kernels_.solve_rows(A, s.lda, k, w, inverse, below, s.top);
+    kernels_.update(A, s.lda, k, w, below, s.top, below, width);
   }
+  in_rows(s.top, s.rows_end(), [&](std::size_t first, std::size_t end) {
+    for (std::size_t k = 0; k < width; k += kPanel) {
+      const std::size_t w = std::min(kPanel, width - k), below = k + w;
+      kernels_.solve_rows(A, s.lda, k, w, inverse, first, end);
+      if (below < width) kernels_.update(A, s.lda, k, w, first, end, below, width);
+    }
+  });
   return true;
 }
 
@@ -227,29 +219,29 @@ void SparseCholesky::apply_update(const Update& update, const Supernode& s, cons
                                   std::int32_t first, std::int32_t end, double* scratch) {
   const Supernode& source = symbolic_.supernodes[update.source];
   const double* P = panels_.data() + source.panel;
+  double* columns[SymbolicFactor::kWidest];
   const Run* column_run = &runs_[update.first_run];
-  double* columns[kColumns];
-  for (std::int32_t c = update.begin; c < update.end; c += kColumns) {
-    const std::int32_t c_end = std::min(update.end, c + kColumns);
-    for (std::int32_t j = c; j < c_end; ++j) {
-      while (column_run->source + column_run->count <= j) ++column_run;
-      const auto target = static_cast<std::size_t>(column_run->target + j - column_run->source);
-      columns[j - c] = panels_.data() + s.panel + target * s.lda;
-    }
-    const Run* at = run;
-    for (std::int32_t r = std::max(first, c); r < end;) {
-      const std::int32_t whole = r / 8 * 8, r_end = std::min(end, whole + kRows);
-      kernels_.product(P, source.lda, source.width, whole, (r_end + 7) / 8 * 8, c, c_end, scratch,
-                       kRows);
-      for (; r < r_end;) {
+  for (std::int32_t c = update.begin; c < update.end; ++c) {
+    while (column_run->source + column_run->count <= c) ++column_run;
+    const auto target = static_cast<std::size_t>(column_run->target + c - column_run->source);
+    columns[c - update.begin] = panels_.data() + s.panel + target * s.lda;
+  }
+  for (std::int32_t low = first / 8 * 8; low < end; low += kRows) {
+    const std::int32_t high = std::min(end, low + kRows), low_row = std::max(first, low);
+    while (run->source + run->count <= low_row) ++run;
+    // Above the diagonal nothing is owed.
+    for (std::int32_t c = update.begin; c < std::min(update.end, high); c += kColumns) {
+      const std::int32_t c_end = std::min(update.end, c + kColumns);
+      const std::int32_t whole = std::max(low, c / 8 * 8);
+      kernels_.product(P, source.lda, static_cast<std::size_t>(source.width), whole,
+                       (high + 7) / 8 * 8, c, c_end, scratch, kRows);
+      const Run* at = run;
+      for (std::int32_t r = std::max(low_row, c); r < high;) {
         while (at->source + at->count <= r) ++at;
-        const std::int32_t stop = std::min(r_end, at->source + at->count);
-        const std::int32_t target = at->target + r - at->source;
-        for (std::int32_t j = 0; j < c_end - c; ++j) {
-          const double* from = scratch + j * kRows + (r - whole);
-          double* to = columns[j] + target;
-          for (std::int32_t i = 0; i < stop - r; ++i) to[i] -= from[i];
-        }
+        const std::int32_t stop = std::min(high, at->source + at->count);
+        const double* from = scratch + (r - whole);
+        for (std::int32_t j = 0; j < c_end - c; ++j, from += kRows)
+          subtract(from, stop - r, columns[c - update.begin + j] + at->target + r - at->source);
         r = stop;
       }
     }

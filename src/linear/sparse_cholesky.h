@@ -55,8 +55,7 @@ class SparseCholesky {
 
   void list_updates();
   void cut_into_subtrees();
-  bool factor_alone(std::size_t supernode, Job& job);
-  bool factor_shared(std::size_t supernode, Job& job);
+  bool factor_supernode(std::size_t supernode, Job& job, bool shared);
   void apply_updates(std::size_t supernode, std::size_t first, std::size_t end, double* scratch);
   void apply_update(const Update& update, const Supernode& to, const Run* run, std::int32_t first,
                     std::int32_t end, double* scratch);

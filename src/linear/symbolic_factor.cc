@@ -184,6 +184,30 @@ void lay_out(Supernode& s, SymbolicFactor& out) {
   out.flops += flops_of(s.width, s.below);
 }
 
+/// A group's columns as supernodes of about equal width, cut between nodes, each the parent of the
+/// one before.
+void add_pieces(Index first, const Indices& weights, const Indices& rows, SymbolicFactor& out) {
+  const Index width = std::accumulate(weights.begin(), weights.end(), 0);
+  const Index count = (width + SymbolicFactor::kWidest - 9) / (SymbolicFactor::kWidest - 8);
+  const Index equal = std::min(SymbolicFactor::kWidest, (width + count - 1) / count + 8);
+  std::size_t node = 0;
+  for (Index done = 0; done < width;) {
+    Supernode s{};
+    s.first = first + done;
+    while (node < weights.size() && (s.width == 0 || s.width + weights[node] <= equal))
+      s.width += weights[node++];
+    done += s.width;
+    s.parent = static_cast<Index>(out.supernodes.size()) + 1;
+    s.first_row = out.rows.size();
+    for (Index p = first + done; p < first + width; ++p) out.rows.push_back(p);
+    out.rows.insert(out.rows.end(), rows.begin(), rows.end());
+    s.below = static_cast<Index>(out.rows.size() - s.first_row);
+    std::fill_n(out.owner.begin() + s.first, s.width, static_cast<Index>(out.supernodes.size()));
+    lay_out(s, out);
+    out.supernodes.push_back(s);
+  }
+}
+
 }  // namespace
 
 SymbolicFactor analyse(const ColumnGraph& graph) {
@@ -204,32 +228,37 @@ SymbolicFactor analyse(const ColumnGraph& graph) {
   out.position.resize(graph.of_column.size());
   out.owner.resize(graph.of_column.size());
   Index next = 0;
-  for (const Group& group : groups) {
-    Supernode s{};
-    s.first = next;
-    s.width = static_cast<Index>(group.width);
-    s.parent = group.parent;
+  for (const Group& group : groups)
     for (Index j : group.nodes)
       for (Index c = graph.first[order[j]]; c < graph.first[order[j] + 1]; ++c)
         out.position[graph.columns[c]] = next++;
-    std::fill(out.owner.begin() + s.first, out.owner.begin() + next,
-              static_cast<Index>(out.supernodes.size()));
-    out.supernodes.push_back(s);
-  }
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    Supernode& s = out.supernodes[g];
-    s.first_row = out.rows.size();
-    for (Index j : groups[g].rows)
+  Indices first_piece, rows, weights;
+  next = 0;
+  for (const Group& group : groups) {
+    rows.clear();
+    for (Index j : group.rows)
       for (Index c = graph.first[order[j]]; c < graph.first[order[j] + 1]; ++c)
-        out.rows.push_back(out.position[graph.columns[c]]);
-    std::sort(out.rows.begin() + static_cast<std::ptrdiff_t>(s.first_row), out.rows.end());
-    s.below = static_cast<Index>(out.rows.size() - s.first_row);
-    lay_out(s, out);
+        rows.push_back(out.position[graph.columns[c]]);
+    std::sort(rows.begin(), rows.end());
+    first_piece.push_back(static_cast<Index>(out.supernodes.size()));
+    weights.clear();
+    for (Index j : group.nodes) weights.push_back(graph.weight(order[j]));
+    add_pieces(next, weights, rows, out);
+    next += static_cast<Index>(group.width);
   }
-  for (std::size_t g = 0; g < groups.size(); ++g) out.supernodes[g].subtree = static_cast<Index>(g);
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    if (const Index p = out.supernodes[g].parent; p >= 0)
-      out.supernodes[p].subtree = std::min(out.supernodes[p].subtree, out.supernodes[g].subtree);
+  // The last piece of a group hangs below its parent's first.
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const std::size_t end =
+        g + 1 < groups.size() ? std::size_t(first_piece[g + 1]) : out.supernodes.size();
+    out.supernodes[end - 1].parent = groups[g].parent < 0 ? -1 : first_piece[groups[g].parent];
+  }
+  for (std::size_t s = 0; s < out.supernodes.size(); ++s)
+    out.supernodes[s].subtree = static_cast<Index>(s);
+  for (const Supernode& s : out.supernodes)
+    if (s.parent >= 0) {
+      Index& subtree = out.supernodes[s.parent].subtree;
+      subtree = std::min(subtree, s.subtree);
+    }
   return out;
 }
 

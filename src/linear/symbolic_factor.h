@@ -25,6 +25,9 @@ struct Supernode {
 
 /// What the factor P A P^T = L L^T looks like: a pure function of the graph.
 struct SymbolicFactor {
+  /// Wider ones are cut: what a panel owes the next is then a product like any other.
+  static constexpr std::int32_t kWidest = 256;
+
   std::vector<std::int32_t> position;  ///< of each column in the order of elimination
   std::vector<std::int32_t> owner;     ///< supernode of each position
   std::vector<Supernode> supernodes;   ///< children before parents

@@ -106,6 +106,20 @@ TEST(SparseCholesky, SolvesAsTheDenseSolverOnEveryInstructionSet) {
         }
 }
 
+TEST(SparseCholesky, SolvesAsTheDenseSolverWherePanelsAreCut) {
+  Threads threads(2);
+  const Kernels& kernels = *available_kernels().front();
+  for (Lenses lenses : {Lenses::own, Lenses::one_of_three}) {
+    const Scene scene = random_scene(230, lenses, 70);
+    const SymbolicFactor symbolic = analyse(build_column_graph(scene.columns, scene.chunks.tiles));
+    for (const Supernode& s : symbolic.supernodes) ASSERT_LE(s.width, SymbolicFactor::kWidest);
+    const auto dense = make_dense_solver(scene.columns, kernels, threads);
+    const auto sparse = make_sparse_solver(scene.columns, scene.chunks, kernels, threads);
+    const std::vector<double> expected = solution(scene, *dense), x = solution(scene, *sparse);
+    for (std::size_t c = 0; c < x.size(); ++c) EXPECT_NEAR(x[c], expected[c], 1e-14);
+  }
+}
+
 TEST(SparseCholesky, SameBitsForAnyThreadCount) {
   const Kernels& kernels = *available_kernels().front();
   for (Lenses lenses : {Lenses::own, Lenses::one_of_three}) {
