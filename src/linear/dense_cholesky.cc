@@ -92,7 +92,16 @@ void product(const double* P, std::size_t lda, std::size_t depth, std::size_t fi
              std::size_t end, std::size_t c, std::size_t c_end, double* C, std::size_t ldc) {
   for (; c + kWide <= c_end; c += kWide, C += kWide * ldc)
     product_columns<kWide>(P, lda, depth, first, end, c, C, ldc);
-  for (; c < c_end; ++c, C += ldc) product_columns<1>(P, lda, depth, first, end, c, C, ldc);
+  // One column by itself waits for its own sums: the rest goes in halves.
+  if (kWide > 4 && c + 4 <= c_end) {
+    product_columns<4>(P, lda, depth, first, end, c, C, ldc);
+    c += 4, C += 4 * ldc;
+  }
+  if (c + 2 <= c_end) {
+    product_columns<2>(P, lda, depth, first, end, c, C, ldc);
+    c += 2, C += 2 * ldc;
+  }
+  if (c < c_end) product_columns<1>(P, lda, depth, first, end, c, C, ldc);
 }
 
 /// Columns [k, k + width), width <= 8, of rows [first, end): A <- A L^-T.
