@@ -27,7 +27,8 @@ struct DenseKernels {
   /// A[first..end, c..c_end] -= P[rows] P[columns]^T with P the columns [k, k + width).
   void (*update)(double* A, std::size_t lda, std::size_t k, std::size_t width, std::size_t first,
                  std::size_t end, std::size_t c, std::size_t c_end);
-  /// C <- P[rows first..end] P[rows c..c_end]^T over `depth` columns of P; C's first row is `first`.
+  /// C <- P[rows first..end] P[rows c..c_end]^T over `depth` columns of P; C's first row is
+  /// `first`.
   void (*product)(const double* P, std::size_t lda, std::size_t depth, std::size_t first,
                   std::size_t end, std::size_t c, std::size_t c_end, double* C, std::size_t ldc);
   /// x <- L^-T L^-1 x.
