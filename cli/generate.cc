@@ -2,14 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <cmath>
+#include <filesystem>
 #include <memory>
 #include <string>
 
+#include "counting_sink.h"
 #include "inspect/statistics.h"
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "scene_arguments.h"
+#include "platform/memory.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -21,20 +25,66 @@ namespace {
 struct Arguments {
   CommonOptions common;
   SceneOptions scene;
+  FamilyArguments family;
   std::string out, truth;
 };
 
-Json document_of(const Arguments& arguments, const Scene& scene, const Statistics& statistics,
-                 double rms_px, double write_s, double total_s) {
+/// What was written, whatever way it was made.
+struct Made {
+  Json counts;
+  std::string text;
+  Statistics statistics;
+  double rms_px = 0;
+  Json problem_bytes;  ///< null: it was never held
+  double write_s = 0;  ///< of what was held: else writing and making are one
+};
+
+bool is_point_cloud(std::filesystem::path path) {
+  if (path.extension() == ".gz" || path.extension() == ".bz2") path.replace_extension();
+  return path.extension() == ".ply";
+}
+
+Made write_whole(const Scene& scene, const Arguments& arguments) {
+  const Timer writing;
+  write(scene.start, arguments.out).value();
+  if (!arguments.truth.empty()) write(scene.truth, arguments.truth).value();
+  const double write_s = writing.seconds();
+  return {counts_json(scene.start),     counts_text(scene.start),      statistics_of(scene.start),
+          evaluate(scene.start).rms_px, Json(size_bytes(scene.start)), write_s};
+}
+
+StreamedScene stream_to(CountingSink& sink, const FamilyOptions& options, SceneState state) {
+  const StreamedScene scene = stream(options, state, sink).value();
+  sink.commit().value();
+  return scene;
+}
+
+Made make(const Arguments& arguments, Interrupt& interrupt) {
+  interrupt.begin_write();
+  if (!arguments.family.chosen()) return write_whole(generate(arguments.scene).value(), arguments);
+  const FamilyOptions options = family_options(arguments.family, arguments.scene);
+  if (is_point_cloud(arguments.out) || is_point_cloud(arguments.truth))
+    return write_whole(generate(options).value(), arguments);
+  CountingSink start(create_output(arguments.out).value());
+  const StreamedScene scene = stream_to(start, options, SceneState::start);
+  if (!arguments.truth.empty()) {
+    CountingSink truth(create_output(arguments.truth).value());
+    stream_to(truth, options, SceneState::truth);
+  }
+  return {start.totals_json(), start.totals_text(), start.statistics(), scene.rms_px, Json(), 0};
+}
+
+Json document_of(const Arguments& arguments, const Made& made, double total_s) {
   Json document = {{"version", SHEAF_VERSION},
                    {"options", scene_options_json(arguments.scene)},
                    {"output", arguments.out},
                    {"truth", arguments.truth.empty() ? Json() : Json(arguments.truth)}};
-  document.update(counts_json(scene.start));
-  document.update(statistics_json(statistics));
-  document["rms_px"] = number(rms_px);
-  document["memory"] = {{"problem_bytes", size_bytes(scene.start)}, {"peak_bytes", peak_bytes()}};
-  document["time"] = {{"write_s", write_s}, {"total_s", total_s}};
+  document["options"].update(family_json(arguments.family, arguments.scene));
+  document.update(made.counts);
+  document.update(statistics_json(made.statistics));
+  document["rms_px"] = number(made.rms_px);
+  document["memory"] = {{"problem_bytes", made.problem_bytes}, {"peak_bytes", peak_resident_bytes()}};
+  document["time"] = {{"write_s", made.write_s}, {"total_s", total_s}};
   return document;
 }
 
@@ -43,25 +93,16 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out}, {"--truth", arguments.truth}, {"--json", json}});
-  const Scene scene = generate(arguments.scene).value();
-  interrupt.begin_write();
-  const Timer writing;
-  write(scene.start, arguments.out).value();
-  if (!arguments.truth.empty()) write(scene.truth, arguments.truth).value();
-  const double write_s = writing.seconds();
-  const Statistics statistics = statistics_of(scene.start);
-  const Evaluation evaluation = evaluate(scene.start);
-  fmt::print("{}: {}\n", arguments.out, counts_text(scene.start));
+  const Made made = make(arguments, interrupt);
+  const Statistics& statistics = made.statistics;
+  fmt::print("{}: {}\n", arguments.out, made.text);
   fmt::print("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
              statistics.track.min, statistics.track.max, statistics.mean_track);
   fmt::print("images      {:.0f} to {:.0f} observations, median {:.6g}\n",
              statistics.observations_per_image.min, statistics.observations_per_image.max,
              statistics.observations_per_image.median);
-  fmt::print("rms         {:.6g} px at the start\n", evaluation.rms_px);
-  if (!json.empty())
-    write_json(
-        document_of(arguments, scene, statistics, evaluation.rms_px, write_s, total.seconds()),
-        json);
+  fmt::print("rms         {:.6g} px at the start\n", made.rms_px);
+  if (!json.empty()) write_json(document_of(arguments, made, total.seconds()), json);
   return 0;
 }
 
@@ -77,8 +118,12 @@ void add_generate(CLI::App& app, int& exit_code) {
                   "also write the undisturbed scene, with its exact pixels")
       ->type_name("FILE");
   add_scene_options(verb, arguments->scene);
+  add_family_options(verb, arguments->family);
   add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt");
+  verb.footer(
+      "Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt\n"
+      "\nA synthetic scene of a published problem's size:\n"
+      "  sheaf generate street.txt --like ladybug-138");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

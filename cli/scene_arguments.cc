@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene_arguments.h"
 
+#include <cmath>
 #include <limits>
 
 #include "verb.h"
@@ -38,6 +39,70 @@ void add_scene_options(CLI::App& verb, SceneOptions& o) {
       ->type_name("S")
       ->check(whole_number_from(0, "a whole number from 0 up"))
       ->capture_default_str();
+}
+
+void add_family_options(CLI::App& verb, FamilyArguments& a) {
+  CLI::Option* like =
+      verb.add_option("--like", a.like,
+                      "family and size of a published problem, as ladybug-1723, trafalgar-257, "
+                      "dubrovnik-356, venice-1778 or final-13682; all is synthetic")
+          ->type_name("NAME");
+  CLI::Option* family =
+      verb.add_option("--family", a.family,
+                      "street (a car's images, with loops) or collection (photographs of popular "
+                      "spots), instead of a lakeside")
+          ->type_name("NAME")
+          ->check(one_of({"street", "collection"}));
+  for (const char* name : {"--cameras", "--points", "--mean-track"})
+    like->excludes(verb.get_option(name));
+  like->excludes(family);
+  for (const char* name : {"--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
+    for (CLI::Option* option : {like, family}) option->excludes(verb.get_option(name));
+  verb.add_option("--outliers", a.outliers,
+                  "with --like and --family: fraction of the measurements that are wrong")
+      ->type_name("F")
+      ->check(number_in(0, 1, true, "a number from 0 to 1"))
+      ->capture_default_str();
+  verb.add_option("--drift", a.drift,
+                  "with --like and --family: size of the start's errors, 0 for none")
+      ->type_name("S")
+      ->check(number_in(0, 100, true, "a number from 0 to 100"))
+      ->capture_default_str();
+}
+
+FamilyOptions family_options(const FamilyArguments& a, const SceneOptions& scene) {
+  FamilyOptions options;
+  if (!a.like.empty()) {
+    options = scene_like(a.like).value();
+  } else {
+    options.family = a.family == "street" ? SceneFamily::street : SceneFamily::collection;
+    options.images = scene.images;
+    options.points = scene.points;
+    options.observations =
+        static_cast<std::uint64_t>(std::floor(scene.mean_track * scene.points + 0.5));
+  }
+  options.pixel_noise_px = scene.pixel_noise_px;
+  options.outliers = a.outliers;
+  options.drift = a.drift;
+  options.seed = scene.seed;
+  return options;
+}
+
+Json family_json(const FamilyArguments& a, const SceneOptions& scene) {
+  if (!a.chosen())
+    return {{"family", "lakeside"}, {"like", nullptr}, {"outliers", nullptr}, {"drift", nullptr}};
+  const FamilyOptions options = family_options(a, scene);
+  return {{"family", options.family == SceneFamily::street ? "street" : "collection"},
+          {"like", a.like.empty() ? Json() : Json(a.like)},
+          {"outliers", options.outliers},
+          {"drift", options.drift},
+          {"cameras", options.images},
+          {"points", options.points},
+          {"mean_track", static_cast<double>(options.observations) / options.points},
+          {"rotation_noise_rad", nullptr},
+          {"center_noise", nullptr},
+          {"point_noise", nullptr},
+          {"focal_noise", nullptr}};
 }
 
 }  // namespace sheaf

@@ -3,12 +3,31 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
 
+#include "json_document.h"
 #include "sheaf/scene.h"
 
 namespace sheaf {
 
 /// --cameras, --points, --mean-track, the noises and --seed.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
+
+/// Scenes of a family; counts, pixel noise and seed are those of the SceneOptions.
+struct FamilyArguments {
+  std::string like, family;  ///< both empty: the lakeside that SceneOptions describes
+  double outliers = FamilyOptions().outliers;
+  double drift = FamilyOptions().drift;
+  bool chosen() const { return !like.empty() || !family.empty(); }
+};
+
+/// --like, --family, --outliers and --drift, after `add_scene_options`.
+void add_family_options(CLI::App& verb, FamilyArguments& arguments);
+
+/// Throws Error (ErrorCode::usage) for a name that is not known.
+FamilyOptions family_options(const FamilyArguments& arguments, const SceneOptions& scene);
+
+/// What differs from the `options` of a lakeside scene, and the family's own.
+Json family_json(const FamilyArguments& arguments, const SceneOptions& scene);
 
 }  // namespace sheaf

@@ -84,7 +84,7 @@ struct StreamedScene {
   std::uint64_t behind = 0;  ///< observations whose point lies behind its camera
 };
 
-/// Makes the scene without ever holding it: memory grows with the images alone (about 400 bytes
+/// Makes the scene without ever holding it: memory grows with the images alone (about 700 bytes
 /// each), so that millions of images can be written. Errors: ErrorCode::usage when the counts
 /// cannot be met.
 Result<StreamedScene> stream(const FamilyOptions& options, SceneState state, SceneSink& sink);

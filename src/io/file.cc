@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "io/bal.h"
+#include "io/bal_sink.h"
 #include "io/byte_source.h"
 #include "io/output_file.h"
 #include "io/ply.h"
@@ -110,6 +111,12 @@ Result<void> write(const Problem& problem, const std::filesystem::path& path) {
   } catch (const std::bad_alloc&) {
     return out_of_memory(path);
   }
+}
+
+Result<OutputFile> create_output(const std::filesystem::path& path) {
+  Compression compression;
+  strip_compression(path, compression);
+  return OutputFile::create(path, compression);
 }
 
 Result<void> check_writable(const std::filesystem::path& path) {

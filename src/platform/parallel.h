@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -34,9 +35,13 @@ class Threads {
   /// count 0: as many as the machine offers to this process.
   explicit Threads(int count)
       : count_(count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency()),
-        allowed_(oneapi::tbb::global_control::max_allowed_parallelism,
-                 std::max(count_, oneapi::tbb::this_task_arena::max_concurrency())),
-        arena_(count_) {}
+        arena_(count_) {
+    // More threads than cores run only where this allows them (and the request would be warned
+    // of). Of several such controls the least holds, so only those that need one make one.
+    if (count_ > oneapi::tbb::this_task_arena::max_concurrency())
+      allowed_.emplace(oneapi::tbb::global_control::max_allowed_parallelism, count_);
+    arena_.initialize();
+  }
 
   int count() const { return count_; }
 
@@ -80,8 +85,7 @@ class Threads {
 
  private:
   int count_;
-  /// More threads than cores run only where this allows them; the warning would be printed.
-  oneapi::tbb::global_control allowed_;
+  std::optional<oneapi::tbb::global_control> allowed_;
   oneapi::tbb::task_arena arena_;
 };
 

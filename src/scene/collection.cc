@@ -17,10 +17,12 @@ constexpr std::uint64_t kSpotStream = 111, kViewStream = 112, kOrderStream = 113
 constexpr double kTurn = 6.28318530717958647692;
 constexpr double kCell = 0.35;  // side of a house
 
-// What people photograph. New spots grow beside old ones, more often beside popular ones.
+// What people photograph. Each spot lies on from another, mostly from the one before it: the
+// streets of a town, with branches.
 struct Spot {
   double x = 0, y = 0;
   double direction = 0;  // from where most photographs are taken, radians
+  double heading = 0;    // of the way there
   std::uint32_t parent = 0;
 };
 
@@ -29,15 +31,17 @@ std::vector<Spot> make_spots(std::size_t count, Random& random) {
   for (std::size_t k = 0; k < count; ++k) {
     Spot& spot = spots[k];
     const double u = random.uniform();
-    spot.parent = static_cast<std::uint32_t>(u * u * static_cast<double>(k));
+    spot.parent = static_cast<std::uint32_t>((1 - u * u * u) * static_cast<double>(k));
     spot.direction = kTurn * random.uniform();
-    const SineCosine to = portable_sine_cosine(kTurn * random.uniform());
-    const double distance = random.uniform(1.4, 2.4);
+    spot.heading =
+        k == 0 ? kTurn * random.uniform() : spots[spot.parent].heading + 0.6 * random.normal();
+    const SineCosine to = portable_sine_cosine(spot.heading);
+    const double distance = random.uniform(2.2, 3.4);
     if (k == 0) continue;
     spot.x = spots[spot.parent].x + distance * to.cosine;
     spot.y = spots[spot.parent].y + distance * to.sine;
     // Streets lead people around: the view does not turn at once.
-    spot.direction = spots[spot.parent].direction + 0.5 * random.normal();
+    spot.direction = spots[spot.parent].direction + 0.3 * random.normal();
   }
   return spots;
 }
@@ -86,21 +90,23 @@ struct Target {
   double x, y;
 };
 
-View make_view(const std::vector<Spot>& spots, std::uint32_t group, bool few, double focal_px,
-               Random& random, Target& target) {
+// `number` counts the images of a spot: every sixth stands between the spot and its parent.
+View make_view(const std::vector<Spot>& spots, std::uint32_t group, std::uint32_t number, bool few,
+               double focal_px, Random& random, Target& target) {
   const Spot& spot = spots[group];
   const Spot& parent = spots[spot.parent];
-  const bool between = random.uniform() < 0.15;
-  const double part = between ? random.uniform() : 0;
+  const bool between = number % 6 == 0;
+  const double part = !between ? 0 : number == 0 ? 0.5 : random.uniform();
   const double spread = few ? 0.3 : 0.45;
   target = {spot.x + part * (parent.x - spot.x) + spread * random.normal(),
             spot.y + part * (parent.y - spot.y) + spread * random.normal()};
   const double zoom = growth(0.3 * random.normal());
   const double distance = std::clamp(
-      2.2 * std::sqrt(zoom) * growth(0.25 * random.normal()) * (between ? 1.6 : 1), 0.9, 14.0);
-  const double side = random.uniform() < 0.3 ? (few ? 0.75 : 0.6) : 0;
+      2.2 * std::sqrt(zoom) * growth(0.25 * random.normal()) * (between ? 1.4 : 1), 0.9, 14.0);
+  const double side = random.uniform() < 0.3 && number > 0 ? (few ? 0.75 : 0.6) : 0;
   const SineCosine a =
-      portable_sine_cosine(spot.direction + side + (few ? 0.07 : 0.1) * random.normal());
+      portable_sine_cosine(spot.direction + part * (parent.direction - spot.direction) + side +
+                           (few ? 0.07 : 0.1) * random.normal());
   const SineCosine e = portable_sine_cosine(random.uniform(0.38, 0.55));
   const Vector3<double> back = {e.cosine * a.cosine, e.cosine * a.sine, e.sine};
   const double roll = 0.03 * random.normal();
@@ -152,21 +158,26 @@ std::vector<std::uint32_t> curve_order(const std::vector<Target>& targets, doubl
   return order;
 }
 
-// Each spot was put together by itself and joined to its parent: errors add up along the tree.
+// Each spot was put together by itself and joined to its parent: errors add up along the tree. They
+// fade over some spots, as where branches meet and are joined once more.
 std::vector<Similarity> join(const std::vector<Spot>& spots, double size, Random& random) {
+  constexpr double kKept = 0.85;
   std::vector<Similarity> drifts(spots.size());
   for (std::size_t k = 0; k < spots.size(); ++k) {
     const Similarity& parent = drifts[spots[k].parent];
     const Vector3<double> position = {spots[k].x, spots[k].y, 0};
-    const Quaternion<double> turn = portable_quaternion(normal3(random, 0.003 * size));
-    const double scale = 1 + std::max(0.004 * size * random.normal(), -0.5);
+    const Vector3<double> carried = parent(position);
+    Vector3<double> turn = portable_angle_axis(parent.turn);
+    const Vector3<double> own_turn = normal3(random, 0.003 * size);
     const Vector3<double> move = normal3(random, 0.004 * size);
     Similarity drift;
     drift.from = position;
-    drift.to = parent(position);
-    for (int i = 0; i < 3; ++i) drift.to[i] += move[i];
-    drift.turn = normalized(multiply(turn, parent.turn));
-    drift.scale = scale * parent.scale;
+    for (int i = 0; i < 3; ++i) {
+      drift.to[i] = position[i] + kKept * (carried[i] - position[i]) + move[i];
+      turn[i] = kKept * turn[i] + own_turn[i];
+    }
+    drift.turn = portable_quaternion(turn);
+    drift.scale = std::max(1 + kKept * (parent.scale - 1) + 0.004 * size * random.normal(), 0.5);
     drifts[k] = drift;
   }
   return drifts;
@@ -191,8 +202,11 @@ Layout make_collection(const FamilyOptions& options) {
   std::vector<View> views(images);
   std::vector<Target> targets(images);
   const double focal_px = options.focal_px > 0 ? options.focal_px : 1500;
-  for (std::uint32_t i = 0; i < images; ++i)
-    views[i] = make_view(spots, spot_of[i], few, focal_px, random, targets[i]);
+  std::uint32_t number = 0;
+  for (std::uint32_t i = 0; i < images; ++i) {
+    number = i > 0 && spot_of[i] == spot_of[i - 1] ? number + 1 : 0;
+    views[i] = make_view(spots, spot_of[i], number, few, focal_px, random, targets[i]);
+  }
 
   Layout layout;
   layout.family = SceneFamily::collection;
@@ -223,7 +237,8 @@ bool collection_point(const View& view, double x, double y, Random& random, Vect
   for (int k = 0; k < 3; ++k) ray[k] = x * R[k] + y * R[3 + k] - R[6 + k];
   const double share = random.uniform(), rare = random.uniform();
   double depth;
-  if (ray[2] < -0.06) {
+  // What lies far behind the spot is hidden by houses, but for a little.
+  if (ray[2] < -0.24 || (ray[2] < -0.06 && rare < 0.04)) {
     depth = -view.center[2] / ray[2];
     // Houses: the ray ends on a wall or a roof of the cell where it would meet the ground.
     const auto cell = [&](int k) {

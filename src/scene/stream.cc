@@ -25,6 +25,7 @@ namespace {
 constexpr std::uint64_t kPixelStream = std::uint64_t{4} << 40;
 constexpr std::uint64_t kMost = std::uint64_t{1} << 32;  // of a point's number in a stream
 constexpr std::uint64_t kSample = 20000;
+constexpr std::uint64_t kKept = 5000000;  // 120 MB; later points are made once more
 
 Result<void> check(const FamilyOptions& o) {
   const auto refuse = [](const std::string& message) { return Error(ErrorCode::usage, message); };
@@ -83,7 +84,6 @@ std::uint64_t settle(TrackMaker& maker, const FamilyOptions& options) {
     if (std::fabs(miss) < 0.006) break;
     mean = corrected(mean, static_cast<double>(found) / static_cast<double>(options.points));
   }
-  maker.set_mean(mean);
   return found;
 }
 
@@ -115,10 +115,10 @@ class Streamer {
     for (std::uint64_t i = 0; i < options_.points && sink.more(); ++i) stream_track(i, sink);
     for (const ViewState& state : states_)
       sink.image(state.angle_axis, state.translation, state.intrinsics);
-    Track track;
-    for (std::uint64_t i = 0; i < options_.points && sink.more(); ++i) {
-      maker_.make(i, track);
-      sink.point(point_of(i, track));
+    for (const Vector3<double>& X : kept_) sink.point(X);
+    for (std::uint64_t i = kept_.size(); i < options_.points && sink.more(); ++i) {
+      maker_.make(i, track_);
+      sink.point(point_of(i, track_));
     }
     out_.rms_px =
         std::sqrt(sum_ / static_cast<double>(std::max<std::uint64_t>(1, out_.observations)));
@@ -133,6 +133,7 @@ class Streamer {
   void stream_track(std::uint64_t i, SceneSink& sink) {
     maker_.make(i, track_);
     const Vector3<double> X = point_of(i, track_);
+    if (i < kKept) kept_.push_back(X);
     for (std::uint32_t& v : track_.views) v = layout_.views[v].file_index;
     std::sort(track_.views.begin(), track_.views.end());
     Random random(options_.seed, kPixelStream + i);
@@ -155,6 +156,7 @@ class Streamer {
   const bool start_;
   const std::vector<ViewState> truth_, states_;
   Track track_;
+  std::vector<Vector3<double>> kept_;  // in the file points come last: the first ones are kept
   double sum_ = 0;
   StreamedScene out_;
 };

@@ -95,8 +95,8 @@ View make_view(const std::vector<Edge>& path, std::uint32_t i, double lane, doub
                  kEye + jitter[2]};
   // Three lenses take turns: ahead, half left, half right.
   const double heading = i % 3 == 0 ? 0 : (i % 3 == 1 ? 0.45 : -0.45);
-  view.rotation = looking(forward, heading + 0.02 * random.normal(), 0.02 * random.normal(),
-                          0.02 * random.normal());
+  const Vector3<double> turn = normal3(random, 0.02);
+  view.rotation = looking(forward, heading + turn[0], turn[1], turn[2]);
   view.intrinsics = {focal_px * (1 + 0.012 * random.normal()), -0.03 + 0.012 * random.normal(),
                      0.004 + 0.003 * random.normal()};
   view.half_x = 1.0;

@@ -135,7 +135,8 @@ void TrackMaker::gather(std::uint32_t length, bool eager, Random& random, Track&
   track.views.assign(1, track.seed_view);
   taken_[track.seed_view] = gathering_;
   const Vector3<double>& from = layout_.views[track.seed_view].center;
-  const std::uint32_t reach = 3 + (3 * length) / 4;
+  const std::uint32_t reach =
+      layout_.family == SceneFamily::street ? 2 + length / 2 : 3 + (3 * length) / 4;
   for (std::uint64_t draws = 40 + 14 * std::uint64_t{length}; draws > 0; --draws) {
     const std::uint32_t v = neighbour(track.seed_view, reach, random);
     if (v == kNone || taken_[v] == gathering_) continue;
@@ -153,6 +154,9 @@ void TrackMaker::make(std::uint64_t i, Track& track) {
   Random random(seed_, kTrackStream + i);
   const std::uint32_t length = lengths_.of(i);
   const std::uint32_t seed = seed_of(i);
+  // A car sees few points for long: those take some finding.
+  const std::uint32_t retries =
+      layout_.family == SceneFamily::street ? 1 + std::min(length / 8, 4u) : 1;
   Track best;
   for (std::uint32_t attempt = 0; attempt < 120; ++attempt) {
     // A view that sees nothing others see leaves its points to its neighbours.
@@ -161,7 +165,7 @@ void TrackMaker::make(std::uint64_t i, Track& track) {
     if (!surface(layout_.views[track.seed_view], random, track.X)) continue;
     gather(length, attempt >= 10, random, track);
     if (track.views.size() > best.views.size()) best = track;
-    if (best.views.size() >= length || (attempt >= 1 && best.views.size() >= 2)) break;
+    if (best.views.size() >= length || (attempt >= retries && best.views.size() >= 2)) break;
   }
   track = best;
 }
