@@ -12,8 +12,8 @@
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
-#include "scene_arguments.h"
 #include "platform/memory.h"
+#include "scene_arguments.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -83,7 +83,8 @@ Json document_of(const Arguments& arguments, const Made& made, double total_s) {
   document.update(made.counts);
   document.update(statistics_json(made.statistics));
   document["rms_px"] = number(made.rms_px);
-  document["memory"] = {{"problem_bytes", made.problem_bytes}, {"peak_bytes", peak_resident_bytes()}};
+  document["memory"] = {{"problem_bytes", made.problem_bytes},
+                        {"peak_bytes", peak_resident_bytes()}};
   document["time"] = {{"write_s", made.write_s}, {"total_s", total_s}};
   return document;
 }

@@ -85,7 +85,8 @@ int run(const Arguments& arguments) {
   document["rms_px"] = number(evaluation.rms_px);
   document["behind_camera"] = observations_json(evaluation.behind, input.problem);
   document["not_finite"] = observations_json(evaluation.not_finite, input.problem);
-  document["memory"] = {{"problem_bytes", size_bytes(input.problem)}, {"peak_bytes", peak_resident_bytes()}};
+  document["memory"] = {{"problem_bytes", size_bytes(input.problem)},
+                        {"peak_bytes", peak_resident_bytes()}};
   document["time"] = {{"read_s", input.read_s}, {"total_s", total.seconds()}};
   write_json(document, json);
   return 0;

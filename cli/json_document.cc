@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "json_document.h"
 
-
 #include <algorithm>
 #include <cmath>
 
 #include "inspect/statistics.h"
-#include "platform/memory.h"
 #include "io/output_file.h"
+#include "platform/memory.h"
 
 namespace sheaf {
 namespace {

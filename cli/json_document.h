@@ -38,7 +38,6 @@ struct SolveRecord {
 };
 Json solve_json(const SolveRecord& record, const Summary& summary, const Problem& problem);
 
-
 /// Appears whole or not at all. Throws Error (ErrorCode::unwritable_output).
 void write_json(const Json& document, const std::string& path);
 

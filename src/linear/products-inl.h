@@ -57,8 +57,8 @@ HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count,
   store(ninth, ninths + column);
 }
 
-HWY_INLINE void diagonal_run(const std::uint16_t* records, std::uint32_t count,
-                             const Records& from, double* sums) {
+HWY_INLINE void diagonal_run(const std::uint16_t* records, std::uint32_t count, const Records& from,
+                             double* sums) {
   alignas(64) double ninths[8];
   for (int p = 0; p < kParts; ++p) diagonal_part(records, count, p, from, sums, ninths);
   double rhs = 0;
@@ -96,8 +96,7 @@ inline void diagonal_products(const Batches& batches, const Chunks& chunks, cons
   if (chunks.diagonal.empty()) return diagonal_in_order(batches, chunk, from, sums);
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun run = chunks.diagonal_runs[i];
-    diagonal_run(&chunks.diagonal[run.first], run.count, from,
-                 sums + kDiagonalDoubles * run.image);
+    diagonal_run(&chunks.diagonal[run.first], run.count, from, sums + kDiagonalDoubles * run.image);
   }
 }
 
