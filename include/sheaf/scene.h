@@ -84,9 +84,9 @@ struct StreamedScene {
   std::uint64_t behind = 0;  ///< observations whose point lies behind its camera
 };
 
-/// Makes the scene without ever holding it: memory grows with the images alone (about 700 bytes
-/// each), so that millions of images can be written. Errors: ErrorCode::usage when the counts
-/// cannot be met.
+/// Makes the scene without ever holding it: memory grows with the images (about 700 bytes each) and
+/// is at most 120 MB for the points, so that millions of images can be written. Errors:
+/// ErrorCode::usage when the counts cannot be met.
 Result<StreamedScene> stream(const FamilyOptions& options, SceneState state, SceneSink& sink);
 
 /// Both states in memory.
