@@ -9,6 +9,10 @@
 #include <new>
 #include <type_traits>
 
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
 namespace sheaf {
 
 /// An array aligned to cache lines whose elements are not initialised: pages are first touched by
@@ -26,9 +30,14 @@ class Buffer {
     data_.reset();
     size_ = 0;
     if (size == 0) return;
-    const std::size_t bytes = (size * sizeof(T) + 63) / 64 * 64;
-    data_.reset(static_cast<T*>(std::aligned_alloc(64, bytes)));
+    // Of a large array, touching 4 KiB at a time for the first time costs more than filling it.
+    const std::size_t alignment = size * sizeof(T) >= kLarge ? kHugePage : 64;
+    const std::size_t bytes = (size * sizeof(T) + alignment - 1) / alignment * alignment;
+    data_.reset(static_cast<T*>(std::aligned_alloc(alignment, bytes)));
     if (!data_) throw std::bad_alloc();
+#if defined(__linux__)
+    if (alignment == kHugePage) (void)::madvise(data_.get(), bytes, MADV_HUGEPAGE);
+#endif
     size_ = size;
   }
   void fill(T value) { std::fill(begin(), end(), value); }
@@ -45,6 +54,7 @@ class Buffer {
   std::size_t bytes() const { return size_ * sizeof(T); }
 
  private:
+  static constexpr std::size_t kLarge = std::size_t(3) << 19, kHugePage = std::size_t(2) << 20;
   struct Free {
     void operator()(T* p) const { std::free(p); }
   };

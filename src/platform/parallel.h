@@ -38,6 +38,7 @@ class Threads {
         arena_(count_) {
     // More threads than cores run only where this allows them (and the request would be warned
     // of). Of several such controls the least holds, so only those that need one make one.
+    if (count_ == 1) return;
     if (count_ > oneapi::tbb::this_task_arena::max_concurrency())
       allowed_.emplace(oneapi::tbb::global_control::max_allowed_parallelism, count_);
     arena_.initialize();
