@@ -54,7 +54,7 @@ class Buffer {
   std::size_t bytes() const { return size_ * sizeof(T); }
 
  private:
-  static constexpr std::size_t kLarge = std::size_t(3) << 19, kHugePage = std::size_t(2) << 20;
+  static constexpr std::size_t kLarge = std::size_t(1) << 19, kHugePage = std::size_t(2) << 20;
   struct Free {
     void operator()(T* p) const { std::free(p); }
   };
