@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -138,8 +139,10 @@ std::uint64_t hilbert(std::uint32_t x, std::uint32_t y) {
   return d;
 }
 
-// The views' order along the curve; `shift` (of the square's side) moves its seams.
-std::vector<std::uint32_t> curve_order(const std::vector<Target>& targets, double shift) {
+// The views' order along the curve, or along it within each of their groups; `shift` (of the
+// square's side) moves its seams.
+std::vector<std::uint32_t> curve_order(const std::vector<Target>& targets,
+                                       const std::vector<std::uint32_t>& groups, double shift) {
   double low = 0, high = 0;
   for (const Target& t : targets) {
     low = std::min({low, t.x, t.y});
@@ -149,12 +152,12 @@ std::vector<std::uint32_t> curve_order(const std::vector<Target>& targets, doubl
   const auto grid = [&](double v) {
     return static_cast<std::uint32_t>(65535 * ((v - low) / size + shift));
   };
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(targets.size());
+  std::vector<std::array<std::uint64_t, 3>> keys(targets.size());
   for (std::uint32_t i = 0; i < targets.size(); ++i)
-    keys[i] = {hilbert(grid(targets[i].x), grid(targets[i].y)), i};
+    keys[i] = {groups.empty() ? 0 : groups[i], hilbert(grid(targets[i].x), grid(targets[i].y)), i};
   std::sort(keys.begin(), keys.end());
   std::vector<std::uint32_t> order(targets.size());
-  for (std::size_t i = 0; i < keys.size(); ++i) order[i] = keys[i].second;
+  for (std::size_t i = 0; i < keys.size(); ++i) order[i] = static_cast<std::uint32_t>(keys[i][2]);
   return order;
 }
 
@@ -210,14 +213,15 @@ Layout make_collection(const FamilyOptions& options) {
 
   Layout layout;
   layout.family = SceneFamily::collection;
-  const std::vector<std::uint32_t> order = curve_order(targets, 0);
+  const std::vector<std::uint32_t> order = curve_order(targets, {}, 0);
   layout.views.reserve(images);
   std::vector<std::uint32_t> rank(images);
   for (std::uint32_t i = 0; i < images; ++i) {
     layout.views.push_back(views[order[i]]);
     rank[order[i]] = i;
   }
-  layout.second_order = curve_order(targets, 1.0 / 3);
+  // Where popular spots crowd out a small one, its images still find each other by spot.
+  layout.second_order = curve_order(targets, spot_of, 1.0 / 3);
   layout.second_rank.resize(images);
   for (std::uint32_t i = 0; i < images; ++i) {
     std::uint32_t& view = layout.second_order[i];

@@ -17,7 +17,8 @@ constexpr std::uint64_t kPathStream = 101, kViewStream = 102, kDriftStream = 103
 constexpr double kStep = 0.11;                // between images; the walls stand 1 to 2.2 away
 constexpr std::uint32_t kImagesPerEdge = 60;  // from crossing to crossing
 constexpr double kEdge = kStep * kImagesPerEdge;
-constexpr double kCorner = 1.2;  // a turn begins that far before the crossing
+constexpr double kCorner = 1.2;            // a turn begins that far before the crossing
+constexpr std::uint32_t kLongestLoop = 8;  // edges
 constexpr double kEye = 0.25;
 constexpr double kRoof = 2.5;
 
@@ -131,22 +132,24 @@ std::vector<Similarity> wander(const std::vector<View>& views, double size, Rand
   return drifts;
 }
 
-// Images of edges driven before, in rings.
+// Images of edges driven a short loop before, in rings. A place seen again after a longer drive is
+// not recognised: drift would have carried its two copies far apart.
 std::vector<std::uint32_t> find_revisits(const std::vector<Edge>& path, std::uint32_t images) {
   std::vector<std::uint32_t> next(images);
   for (std::uint32_t i = 0; i < images; ++i) next[i] = i;
-  std::unordered_map<std::uint64_t, std::uint32_t> first;  // of a directed edge: its last drive
+  std::unordered_map<std::uint64_t, std::uint32_t> last_drive;  // of a directed edge
   for (std::size_t e = 0; e * kImagesPerEdge < images; ++e) {
     const Edge& edge = path[e];
     const auto x = static_cast<std::uint64_t>(edge.x + (std::int64_t{1} << 28));
     const auto y = static_cast<std::uint64_t>(edge.y + (std::int64_t{1} << 28));
     const auto direction = static_cast<std::uint64_t>(edge.dx + 1 + 3 * (edge.dy + 1));
-    const auto [entry, fresh] =
-        first.try_emplace((x << 34) | (y << 4) | direction, static_cast<std::uint32_t>(e));
-    if (fresh) continue;
+    const auto last = last_drive.find((x << 34) | (y << 4) | direction);
+    const auto before = last == last_drive.end() ? UINT32_MAX : last->second;
+    last_drive[(x << 34) | (y << 4) | direction] = static_cast<std::uint32_t>(e);
+    if (before == UINT32_MAX || e - before > kLongestLoop) continue;
     for (std::uint32_t k = 0; k < kImagesPerEdge; ++k) {
       const auto i = static_cast<std::uint32_t>(e * kImagesPerEdge + k);
-      if (i < images) std::swap(next[i], next[entry->second * kImagesPerEdge + k]);
+      if (i < images) std::swap(next[i], next[before * kImagesPerEdge + k]);
     }
   }
   return next;

@@ -130,13 +130,15 @@ std::uint32_t TrackMaker::neighbour(std::uint32_t view, std::uint32_t reach, Ran
   return layout_.family == SceneFamily::collection && second ? layout_.second_order[index] : index;
 }
 
-void TrackMaker::gather(std::uint32_t length, bool eager, Random& random, Track& track) {
+void TrackMaker::gather(std::uint32_t length, std::uint32_t attempt, Random& random, Track& track) {
+  const bool eager = attempt >= 10;  // takes whatever sees the point, from farther and farther
   ++gathering_;
   track.views.assign(1, track.seed_view);
   taken_[track.seed_view] = gathering_;
   const Vector3<double>& from = layout_.views[track.seed_view].center;
   const std::uint32_t reach =
-      layout_.family == SceneFamily::street ? 2 + length / 2 : 3 + (3 * length) / 4;
+      (layout_.family == SceneFamily::street ? 2 + length / 2 : 3 + (3 * length) / 4) +
+      (eager ? 2 * attempt : 0);
   for (std::uint64_t draws = 40 + 14 * std::uint64_t{length}; draws > 0; --draws) {
     const std::uint32_t v = neighbour(track.seed_view, reach, random);
     if (v == kNone || taken_[v] == gathering_) continue;
@@ -163,7 +165,7 @@ void TrackMaker::make(std::uint64_t i, Track& track) {
     track.seed_view = attempt < 60 ? seed : neighbour(seed, attempt, random);
     if (track.seed_view == kNone) continue;
     if (!surface(layout_.views[track.seed_view], random, track.X)) continue;
-    gather(length, attempt >= 10, random, track);
+    gather(length, attempt, random, track);
     if (track.views.size() > best.views.size()) best = track;
     if (best.views.size() >= length || (attempt >= retries && best.views.size() >= 2)) break;
   }

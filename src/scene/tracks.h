@@ -47,7 +47,7 @@ class TrackMaker {
   bool surface(const View& view, Random& random, Vector3<double>& X) const;
   double likeness(const View& view, const Vector3<double>& X, const Vector3<double>& from) const;
   std::uint32_t neighbour(std::uint32_t view, std::uint32_t reach, Random& random) const;
-  void gather(std::uint32_t length, bool eager, Random& random, Track& track);
+  void gather(std::uint32_t length, std::uint32_t attempt, Random& random, Track& track);
 
   const Layout& layout_;
   std::uint64_t seed_;
