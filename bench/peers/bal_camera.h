@@ -78,4 +78,36 @@ inline void rotation(const double* w, double* R, double* J) {
     }
 }
 
+/// The angle-axis vector of the rotation nearest to R (row-major), which may have lost its last
+/// digits: R <- (R + R^-T) / 2 thrice, then by the quaternion's largest entry. |w| <= pi.
+inline void angle_axis(double* R, double* w) {
+  for (int turn = 0; turn < 3; ++turn) {
+    double C[9];  // cofactors: R^-T = C / det
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
+        C[3 * i + j] = R[3 * a + c] * R[3 * b + d] - R[3 * a + d] * R[3 * b + c];
+      }
+    const double det = R[0] * C[0] + R[1] * C[1] + R[2] * C[2];
+    for (int i = 0; i < 9; ++i) R[i] = 0.5 * (R[i] + C[i] / det);
+  }
+  // 4 q_i q_j, w first.
+  const double squares[4] = {1 + R[0] + R[4] + R[8], 1 + R[0] - R[4] - R[8], 1 - R[0] + R[4] - R[8],
+                             1 - R[0] - R[4] + R[8]};
+  const double products[4][4] = {{squares[0], R[7] - R[5], R[2] - R[6], R[3] - R[1]},
+                                 {R[7] - R[5], squares[1], R[1] + R[3], R[2] + R[6]},
+                                 {R[2] - R[6], R[1] + R[3], squares[2], R[5] + R[7]},
+                                 {R[3] - R[1], R[2] + R[6], R[5] + R[7], squares[3]}};
+  int largest = 0;
+  for (int i = 1; i < 4; ++i)
+    if (squares[i] > squares[largest]) largest = i;
+  double q[4];
+  const double sign = products[largest][0] < 0 ? -1 : 1;  // q[0] >= 0
+  for (int i = 0; i < 4; ++i)
+    q[i] = sign * products[largest][i] / (2 * std::sqrt(squares[largest]));
+  const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const double scale = sine > 1e-12 ? 2 * std::atan2(sine, q[0]) / sine : 2;
+  for (int i = 0; i < 3; ++i) w[i] = scale * q[1 + i];
+}
+
 }  // namespace peer

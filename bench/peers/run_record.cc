@@ -118,10 +118,12 @@ double RunRecord::now() const { return wall_s() - start_s_ - paused_s_; }
 void RunRecord::pause() { pause_begin_s_ = wall_s(); }
 void RunRecord::resume() { paused_s_ += wall_s() - pause_begin_s_; }
 
-void RunRecord::add(double cost, bool accepted) {
+void RunRecord::add(double cost, bool accepted) { add_at(now(), cost, accepted); }
+
+void RunRecord::add_at(double time_s, double cost, bool accepted) {
   if (accepted && !trace_.empty())
     still_ = trace_.back().second - cost <= 1e-12 * cost ? still_ + 1 : 0;
-  trace_.emplace_back(now(), cost);
+  trace_.emplace_back(time_s, cost);
 }
 
 void RunRecord::finish() {
@@ -146,7 +148,8 @@ std::string RunRecord::json(const std::string& solver, const Arguments& a) const
   out << "], \"seconds_per_iteration\": " << (steps ? stepping_s / static_cast<double>(steps) : 0)
       << ", \"total_s\": " << total_s_
       << ", \"cpu_percent\": " << (total_s_ > 0 ? 100 * cpu_s_ / total_s_ : 0)
-      << ", \"peak_bytes\": " << peak_bytes() << ", \"iterations\": " << steps
+      << ", \"cost_in\": \"" << (in_float_ ? "float" : "double")
+      << "\", \"peak_bytes\": " << peak_bytes() << ", \"iterations\": " << steps
       << ", \"final_cost\": " << (trace_.empty() ? 0.0 : trace_.back().second) << "}\n";
   return out.str();
 }

@@ -43,12 +43,15 @@ class Config {
 class RunRecord {
  public:
   void start();
-  void setup_done() { setup_s_ = now(); }
+  void setup_done() { setup_done_at(now()); }
+  void setup_done_at(double time_s) { setup_s_ = time_s; }
   double now() const;
   void pause();
   void resume();
-  void add(double cost, bool accepted = true);  ///< cost of the state held now
-  void finish();                                ///< the solver returned
+  void add(double cost, bool accepted = true);             ///< cost of the state held now
+  void add_at(double time_s, double cost, bool accepted);  ///< by the peer's own clock
+  void finish();                                           ///< the solver returned
+  void counts_in_float() { in_float_ = true; }  ///< costs and states are rounded to float
 
   /// Target reached, time spent, or two accepted steps with a relative decrease below 1e-12: the
   /// one stopping rule of all solvers, far below what is compared.
@@ -59,6 +62,7 @@ class RunRecord {
   std::vector<std::pair<double, double>> trace_;  // time_s, cost
   double start_s_ = 0, paused_s_ = 0, pause_begin_s_ = 0, setup_s_ = 0, total_s_ = 0;
   double cpu_start_s_ = 0, cpu_s_ = 0;
+  bool in_float_ = false;
   int still_ = 0;  // accepted steps in a row that decreased next to nothing
 };
 
