@@ -33,6 +33,19 @@ class Axis:
         return [v for v in values if self.low <= math.log10(v) <= self.high]
 
 
+class LinearAxis:
+    """[0, high] onto pixels [start, end]."""
+
+    def __init__(self, high, start, end):
+        self.high, self.start, self.end = high, start, end
+
+    def __call__(self, value):
+        return self.start + value / self.high * (self.end - self.start)
+
+    def ticks(self):
+        return [self.high * i / 5 for i in range(6)]
+
+
 def gaps(trace, optimum):
     return [(t, max(c / optimum - 1, FLOOR)) for t, c in trace if t > 0 and math.isfinite(c)]
 
@@ -62,9 +75,9 @@ def mark(kind, x, y, colour):
 
 
 def tick_text(value):
-    exponent = round(math.log10(value))
-    if 1e-3 <= value <= 1e3:
+    if value == 0 or 1e-3 <= value <= 1e3:
         return f"{value:g}"
+    exponent = round(math.log10(value))
     return f'10<tspan dy="-5" font-size="9">{exponent}</tspan>'
 
 
@@ -83,26 +96,20 @@ def grid(x, y):
     return parts
 
 
-def draw(title, curves, optimum):
-    """`curves`: list of (label, trace). The first is drawn last, on top. Returns the SVG text."""
-    drawn = [(label, until_floor(gaps(trace, optimum))) for label, trace in curves]
-    drawn = [(label, points) for label, points in drawn if points]
-    times = [t for _, points in drawn for t, _ in points]
-    highest = max(gap for _, points in drawn for _, gap in points)
-    x = Axis(min(times) / 1.15, max(times) * 1.15, LEFT, WIDTH - RIGHT)
-    y = Axis(FLOOR / 1.5, highest * 1.6, HEIGHT - BOTTOM, TOP)
+def chart(title, x, y, names, curves):
+    """The frame and its curves: `x` and `y` axes, `names` of the two, `curves` a list of (label,
+    places in pixels). The first is drawn last, on top. Returns the SVG text."""
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
            f'width="{WIDTH}" height="{HEIGHT}" font-family="sans-serif" font-size="12" '
            f'fill="#222"><rect width="100%" height="100%" fill="#fff"/>',
            f'<text x="{LEFT}" y="24" font-size="15">{escape(title)}</text>']
     out += grid(x, y)
     out.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 12}" text-anchor="middle">'
-               "seconds, set-up included</text>")
+               f"{escape(names[0])}</text>")
     out.append(f'<text transform="translate(18,{(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" '
-               'text-anchor="middle">cost / best cost − 1</text>')
-    for i, (label, points) in reversed(list(enumerate(drawn))):
+               f'text-anchor="middle">{escape(names[1])}</text>')
+    for i, (label, places) in reversed(list(enumerate(curves))):
         colour, kind = COLOURS[i % len(COLOURS)], MARKS[i % len(MARKS)]
-        places = [(x(t), y(gap)) for t, gap in points]
         path = "L".join(f"{a:.1f},{b:.1f}" for a, b in places)
         out.append(f'<path d="M{path}" fill="none" stroke="{colour}" '
                    f'stroke-width="{2.5 if i == 0 else 1.6}"/>')
@@ -113,3 +120,15 @@ def draw(title, curves, optimum):
                    f'<text x="{WIDTH - RIGHT + 44}" y="{at}">{escape(label)}</text>')
     out.append("</svg>")
     return "\n".join(out) + "\n"
+
+
+def draw(title, curves, optimum):
+    """`curves`: list of (label, trace). Returns the SVG text."""
+    drawn = [(label, until_floor(gaps(trace, optimum))) for label, trace in curves]
+    drawn = [(label, points) for label, points in drawn if points]
+    times = [t for _, points in drawn for t, _ in points]
+    highest = max(gap for _, points in drawn for _, gap in points)
+    x = Axis(min(times) / 1.15, max(times) * 1.15, LEFT, WIDTH - RIGHT)
+    y = Axis(FLOOR / 1.5, highest * 1.6, HEIGHT - BOTTOM, TOP)
+    return chart(title, x, y, ("seconds, set-up included", "cost / best cost − 1"),
+                 [(label, [(x(t), y(gap)) for t, gap in points]) for label, points in drawn])

@@ -12,6 +12,12 @@ def time_to(trace, cost):
     return next((t for t, c in trace if c <= cost), math.inf)
 
 
+def trusted(run, tau):
+    """Whether the run's own trace may be read at f* (1 + tau). One that ends at another cost than its
+    state has counts something else; one that counts in float is read as far as it is exact."""
+    return run["agrees"] and run.get("disagreement", 0.0) <= tau / 10
+
+
 def best_cost(runs):
     """f*: the best cost found by anyone, as evaluated independently. A solver's own figure does not
     count: it could be wrong."""
@@ -32,13 +38,14 @@ def summary_row(name, config, group, optimum):
     row = {"name": name, "config": config, "runs": len(good), "failed": len(group) - len(good)}
     if not good:
         row["message"] = group[0]["failed"]
+        row["limit_s"] = group[0].get("limit_s") if group[0].get("cut") else None
         return row
     row["solver"] = good[0]["solver"]
     row["agrees"] = all(r["agrees"] for r in good)
+    row["limit_s"] = max((r["limit_s"] for r in good if r.get("cut")), default=None)
     row["time_to"] = {}
     for tau in TAUS:
-        # A trace that ends at another cost than the state has counts something else: no time.
-        times = [time_to(r["trace"], optimum * (1 + tau)) if r["agrees"] else math.inf
+        times = [time_to(r["trace"], optimum * (1 + tau)) if trusted(r, tau) else math.inf
                  for r in good]
         row["time_to"][f"{tau:g}"] = finite(statistics.median(times))
     last = [t for t in times if math.isfinite(t)]
@@ -62,17 +69,27 @@ def seconds(value):
     return f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}" if value > 0 else "0"
 
 
+def reached(row, tau):
+    """The cell of a target: seconds, a miss, or the limit that ended the run before."""
+    value = row.get("time_to", {}).get(f"{tau:g}")
+    if value is None and row.get("limit_s"):
+        return f"> {row['limit_s']:g}"
+    return seconds(value)
+
+
 def markdown(rows):
-    """The whole table of one problem. Quickest to 1e-3 first, misses last."""
+    """The whole table of one problem. Quickest to 1e-3 first, misses last. A run that the time limit
+    ended before a target shows the limit."""
     head = ["solver", "configuration"] + [f"to {tau:g}" for tau in TAUS]
     head += ["per iteration", "iterations", "peak MB", "CPU %", "final cost", "spread"]
     lines = ["| " + " | ".join(head) + " |", "|---|---" + "|--:" * (len(head) - 2) + "|"]
     for row in sorted(rows, key=speed):
         if not row["runs"]:
+            cells = [reached(row, TAUS[0]) if row.get("limit_s") else "failed"]
             lines.append(f"| {row['name']} | {row['config']} | " +
-                         " | ".join(["failed"] + [""] * (len(head) - 3)) + " |")
+                         " | ".join(cells + [""] * (len(head) - 3)) + " |")
             continue
-        cells = [row["name"], row["config"]] + [seconds(row["time_to"][f"{t:g}"]) for t in TAUS]
+        cells = [row["name"], row["config"]] + [reached(row, t) for t in TAUS]
         cells += [seconds(row["seconds_per_iteration"]), f"{row['iterations']:.0f}",
                   f"{row['peak_bytes'] / 1e6:.0f}", f"{row['cpu_percent']:.0f}",
                   f"{row['final_cost_independent']:.4f}" + ("" if row["agrees"] else " †"),

@@ -73,6 +73,11 @@ def check_table():
     assert rows["g2o"]["time_to"]["0.1"] is None
     liar = run_table.summary_row("x", "y", [canned_run("x", [[1, 1.0]], 200.0, agrees=False)], 100)
     assert liar["time_to"]["0.1"] is None and "200.0000 †" in run_table.markdown([liar])
+    rounded = canned_run("x", [[1, 100.0]], 100.002, agrees=True, disagreement=2e-5, cut=True,
+                         limit_s=7)
+    row = run_table.summary_row("x", "y", [rounded], 100)
+    assert row["time_to"]["0.001"] == 1 and row["time_to"]["0.0001"] is None
+    assert "| x | y | 1.00 | 1.00 | 1.00 | > 7 | > 7 |" in run_table.markdown([row])
     text = run_table.markdown(document["summary"])
     assert "| g2o | x | miss | miss | miss | miss | miss |" in text and "failed" in text
     order = [line.split("|")[1].strip() for line in text.splitlines()[2:]]
@@ -91,11 +96,15 @@ def check_plot():
 
 
 def check_sheaf_adapter():
-    steps = [{"index": 0, "cost": 9.0, "accepted": True, "time_s": 0.0},
-             {"index": 1, "cost": 9.0, "accepted": False, "time_s": 0.5},
-             {"index": 2, "cost": 4.0, "accepted": True, "time_s": 1.0}]
+    steps = [{"cost": cost, "accepted": accepted, "time_s": 0.5 * i, "gradient_max": 8.0 - i,
+              "linear_iterations": i} for i, (cost, accepted) in enumerate(
+                  [(9.0, True), (9.0, False), (4.0, True)])]
     run = peer_sheaf.run_document({"time": {"setup_s": 0.25, "solve_s": 1.0}, "iterations": steps,
-                                   "memory": {"peak_bytes": 7}, "final_cost": 4.0}, "auto", 1, 99)
+                                   "memory": {"peak_bytes": 7, "forecast_bytes": 6},
+                                   "solver": {"name": "dense", "reason": "small"},
+                                   "precision": "double", "termination": {"code": "x"},
+                                   "final_cost": 4.0}, "auto", 1, 99)
+    assert run["sheaf"]["gradient"] == [8.0, 6.0] and run["sheaf"]["linear_iterations"] == [1, 2]
     assert run["trace"] == [[0.25, 9.0], [1.25, 4.0]]
     assert run["seconds_per_iteration"] == 0.5 and run["total_s"] == 1.25
 

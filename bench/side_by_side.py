@@ -16,6 +16,8 @@ import json
 import math
 import os
 import platform
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,8 +28,9 @@ import evaluate
 import run_table
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-# A solver's own final cost may differ from the independent one by its summation order only.
-AGREEMENT = 1e-9
+# A solver's own final cost may differ from the independent one by its summation order only, or, when
+# it says that it counts in float, by float's rounding (its trace is then read as far as that goes).
+AGREEMENT = {"double": 1e-9, "float": 1e-2}
 # One thread that got less of a core than this was disturbed by other programs: run again.
 UNDISTURBED_PERCENT = 90
 
@@ -44,6 +47,10 @@ def parse_arguments():
     parser.add_argument("--retries", type=int, default=2, help="of a run that was disturbed")
     parser.add_argument("--max-iterations", type=int, default=50)
     parser.add_argument("--time-limit", type=float, default=60.0, help="seconds per run")
+    parser.add_argument("--memory-gb", type=float, default=0.0,
+                        help="of address space for each run; 0: no limit")
+    parser.add_argument("--budget-minutes", type=float, default=math.inf,
+                        help="after this nothing new is started")
     parser.add_argument("--optimum", type=float, default=math.inf,
                         help="a known cost of the (one) problem, when it is below what is found")
     parser.add_argument("--machine", help="JSON of bench-machine, to be kept with the results")
@@ -70,20 +77,44 @@ def run_once(program, name, config, problem, threads, options, folder):
         os.remove(final)
     # Libraries inside a peer (BLAS, OpenMP) get the same count as the peer.
     count = {k: str(threads) for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
-    run = {"name": name, "config": config, "threads": threads}
-    try:
-        done = subprocess.run(line, env={**os.environ, **count}, capture_output=True, text=True,
-                              timeout=60 + 4 * options.time_limit)
-    except subprocess.TimeoutExpired:
-        return {**run, "failed": "did not end in time"}
+    limit = options.time_limit
+    run = {"name": name, "config": config, "threads": threads, "limit_s": limit}
+    done = run_program(line, {**os.environ, **count}, 60 + 2 * limit, options.memory_gb)
+    if done is None:
+        return {**run, "failed": "did not end in time", "cut": True}
     if done.returncode != 0:
         words = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         return {**run, "failed": words[0]}
     run.update(json.loads(done.stdout))
-    run["final_cost_independent"] = evaluate.cost(problem, final)
+    run["cut"] = run["total_s"] >= limit
+    run["final_cost_independent"] = evaluate.cost(problem, final,
+                                                  find_program("evaluate", options.peers))
     own, other = run["final_cost"], run["final_cost_independent"]
-    run["agrees"] = abs(own - other) <= AGREEMENT * max(own, other)
+    run["disagreement"] = abs(own - other) / max(own, other, sys.float_info.min)
+    run["agrees"] = run["disagreement"] <= AGREEMENT[run.get("cost_in", "double")]
     return run
+
+
+def run_program(line, environment, timeout, memory_gb):
+    """The finished process, or None when it had to be ended. Memory is limited so that a greedy peer
+    fails by itself and not the machine with it."""
+    def limit_memory():
+        if memory_gb:
+            resource.setrlimit(resource.RLIMIT_AS, (int(memory_gb * 1e9),) * 2)
+
+    child = subprocess.Popen(line, env=environment, stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE, text=True, start_new_session=True,
+                             preexec_fn=limit_memory)
+    try:
+        out, err = child.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        os.killpg(child.pid, signal.SIGKILL)  # with what a wrapper has started
+        child.communicate()
+        return None
+    except BaseException:
+        os.killpg(child.pid, signal.SIGKILL)
+        raise
+    return subprocess.CompletedProcess(line, child.returncode, out, err)
 
 
 def run_undisturbed(*arguments, retries):
@@ -105,6 +136,10 @@ def compare(problem, solvers, threads, options):
         for turn in range(options.runs):
             for i in range(len(solvers)):
                 name, config, program = solvers[(i + turn) % len(solvers)]
+                if time.time() > options.deadline:
+                    runs.append({"name": name, "config": config, "threads": threads,
+                                 "failed": "not run: the time for all runs was over"})
+                    continue
                 run = run_undisturbed(program, name, config, problem, threads, options, folder,
                                       retries=options.retries)
                 runs.append({**run, "turn": turn})
@@ -173,6 +208,20 @@ def title(document):
     return f"{document['problem']}, {count} thread{'s' if count > 1 else ''}"
 
 
+def find_solvers(text, folders):
+    """[(name, config, program)] of comma-separated NAME:CONFIG, and the names that are not here."""
+    solvers, missing = [], set()
+    for word in filter(None, text.split(",")):
+        name, _, config = word.partition(":")
+        program = find_program(name, folders)
+        if program:
+            solvers.append((name, config, program))
+        elif name not in missing:
+            print(f"peer-{name} is not here: left out", file=sys.stderr)
+            missing.add(name)
+    return solvers, sorted(missing)
+
+
 def machine(path):
     facts = {"cpu": platform.processor() or platform.machine(), "cores": os.cpu_count()}
     if path:
@@ -186,18 +235,13 @@ def main():
     if options.self_test:
         import self_test
         return self_test.run()
-    solvers, missing = [], []
-    for word in options.solvers.split(","):
-        name, _, config = word.partition(":")
-        program = find_program(name, options.peers)
-        (solvers if program else missing).append((name, config, program))
-    for name, _, _ in missing:
-        print(f"peer-{name} is not here: left out", file=sys.stderr)
+    solvers, missing = find_solvers(options.solvers, options.peers)
     if not solvers or not options.problems:
         sys.exit("nothing to run: --problems and --solvers (see --help)")
+    options.deadline = time.time() + 60 * options.budget_minutes
     results = {"version": 1, "date": time.strftime("%Y-%m-%d"), "runs": options.runs,
                "machine": machine(options.machine), "taus": run_table.TAUS,
-               "missing": sorted({name for name, _, _ in missing}), "problems": []}
+               "missing": missing, "problems": []}
     for problem in options.problems:
         for threads in (int(n) for n in options.threads.split(",")):
             results["problems"].append(compare(problem, solvers, threads, options))

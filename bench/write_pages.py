@@ -12,6 +12,7 @@ import sys
 
 import run_table
 import side_by_side
+import suite_report
 
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
 TAU = "1e-06"
@@ -94,7 +95,7 @@ def page(results, plots, kernels=None):
     """BENCHMARKS.md."""
     machine = results["machine"]
     out = ["# Benchmarks\n",
-           "Written by `bench/regenerate.sh`; do not edit. How it is measured: "
+           "Written by `bench/regenerate.sh` (and its ladder by `bench/suite.py`); do not edit. How it is measured: "
            "[bench/README.md](bench/README.md).\n",
            f"Machine: {machine_text(machine)}. {results['date']}. Medians of {results['runs']} "
            "interleaved runs in fresh processes. Times are seconds until the cost is at or below "
@@ -140,8 +141,13 @@ def main():
     if len(sys.argv) > 4:
         with open(sys.argv[4]) as file:
             kernels = json.load(file)
-    with open(os.path.join(root, "BENCHMARKS.md"), "w") as file:
-        file.write(page(results, plots, kernels))
+    benchmarks = os.path.join(root, "BENCHMARKS.md")
+    ladder = ""  # suite.py writes that section
+    if os.path.exists(benchmarks):
+        with open(benchmarks) as file:
+            ladder = suite_report.cut(file.read())
+    with open(benchmarks, "w") as file:
+        file.write(page(results, plots, kernels) + ("\n" + ladder if ladder else ""))
     readme = os.path.join(root, "README.md")
     with open(readme) as file:
         text = file.read()

@@ -8,6 +8,7 @@
 //   lapack                        dense factorisation by LAPACK instead of Eigen
 //   mixed                         float factor with refinement
 //   eta=0.1  radius=1e4           forcing, first trust region radius
+//   nok2                          holds k2, as sheaf's --fix k2
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
@@ -164,7 +165,7 @@ bool choose_solver(peer::Config& config, ceres::Solver::Options& options) {
   return true;
 }
 
-void build(peer::BalFile& file, bool analytic, ceres::Problem& problem,
+void build(peer::BalFile& file, bool analytic, bool hold_k2, ceres::Problem& problem,
            ceres::Solver::Options& options) {
   auto order = std::make_shared<ceres::ParameterBlockOrdering>();
   for (const auto& o : file.observations) {
@@ -181,12 +182,16 @@ void build(peer::BalFile& file, bool analytic, ceres::Problem& problem,
   for (double* block : blocks)
     order->AddElementToGroup(block, problem.ParameterBlockSize(block) == 3 ? 0 : 1);
   options.linear_solver_ordering = order;
+  if (!hold_k2) return;
+  auto* without_k2 = new ceres::SubsetManifold(camera_size, {8});
+  for (double* block : blocks)
+    if (problem.ParameterBlockSize(block) == camera_size) problem.SetManifold(block, without_k2);
 }
 
 int solve(const peer::Arguments& arguments) {
   peer::Config config(arguments.config);
   ceres::Solver::Options options;
-  const bool analytic = config.has("analytic");
+  const bool analytic = config.has("analytic"), hold_k2 = config.has("nok2");
   const bool known = choose_solver(config, options) && analytic != config.has("auto");
   if (!known || !config.unknown().empty()) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
@@ -198,7 +203,7 @@ int solve(const peer::Arguments& arguments) {
   peer::RunRecord record;
   record.start();
   ceres::Problem problem;
-  build(file, analytic, problem, options);
+  build(file, analytic, hold_k2, problem, options);
   record.setup_done();
   options.num_threads = arguments.threads;
   options.max_num_iterations = arguments.max_iterations;

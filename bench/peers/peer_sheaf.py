@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The sheaf command on a file, in the peers' terms.
 
-The words of --config, joined by '-': auto | dense (camera solver), simd=avx2, damping=0.001.
+The words of --config, joined by '-': auto | dense | sparse | explicit | implicit (camera solver; the
+last two iterative), fix=k2, simd=avx2, damping=0.001.
 The command is $SHEAF_COMMAND, or `sheaf` on the PATH. CPU use is the whole process's, reading and
 writing included; times are those of set-up and solving, as for the peers.
 """
@@ -40,6 +41,10 @@ def command_line(a, json_path):
         name, _, value = word.partition("=")
         if name in ("auto", "dense", "sparse", "iterative"):
             line += ["--solver", name]
+        elif name in ("explicit", "implicit"):
+            line += ["--solver", "iterative-" + name]
+        elif name == "fix":
+            line += ["--fix", value]
         elif name == "simd":
             line += ["--simd", value]
         elif name == "damping":
@@ -60,7 +65,17 @@ def run_document(document, config, threads, cpu_percent):
             "trace": trace, "seconds_per_iteration": last / tried if tried else 0,
             "total_s": setup + document["time"]["solve_s"], "cpu_percent": cpu_percent,
             "peak_bytes": document["memory"]["peak_bytes"], "iterations": tried,
-            "final_cost": document["final_cost"]}
+            "final_cost": document["final_cost"], "sheaf": own_words(document)}
+
+
+def own_words(document):
+    """What only sheaf says: its choice, its forecast, why it stopped, and its inner steps."""
+    steps = document["iterations"]
+    return {"solver": document["solver"], "precision": document["precision"],
+            "forecast_bytes": document["memory"]["forecast_bytes"],
+            "termination": document["termination"],
+            "gradient": [steps[0]["gradient_max"], steps[-1]["gradient_max"]],
+            "linear_iterations": [s["linear_iterations"] for s in steps[1:]]}
 
 
 def main():

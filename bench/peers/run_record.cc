@@ -132,7 +132,7 @@ void RunRecord::finish() {
 }
 
 bool RunRecord::over(const Arguments& a) const {
-  return still_ >= 2 || now() >= a.time_limit_s ||
+  return (still_ >= 2 && !in_float_) || now() >= a.time_limit_s ||
          (!trace_.empty() && trace_.back().second <= a.cost_target);
 }
 

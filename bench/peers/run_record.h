@@ -54,7 +54,8 @@ class RunRecord {
   void counts_in_float() { in_float_ = true; }  ///< costs and states are rounded to float
 
   /// Target reached, time spent, or two accepted steps with a relative decrease below 1e-12: the
-  /// one stopping rule of all solvers, far below what is compared.
+  /// one stopping rule of all solvers, far below what is compared. (Costs in float cannot show such
+  /// a decrease: they are not asked.)
   bool over(const Arguments& arguments) const;
   std::string json(const std::string& solver, const Arguments& arguments) const;
 
