@@ -11,6 +11,8 @@ import cost_plot
 import evaluate
 import run_table
 import side_by_side
+import suite
+import suite_report
 import write_pages
 
 sys.path.insert(0, os.path.join(side_by_side.HERE, "peers"))
@@ -125,8 +127,67 @@ def check_pages():
     assert "| avx2/trial | 2.000 | 60 | 30.0 | 25 % | 20 | 10.0 | 50 % |" in text
 
 
+def canned_ladder():
+    """Two problems: `auto` takes 2 s and 4 s where the best explicit choice takes 2 s and 1 s; the
+    peer takes 6 s and is cut at 7 s."""
+    def document(name, cameras, autos, others, peer):
+        said = {"solver": {"name": "dense"}, "precision": "double", "forecast_bytes": 9e5,
+                "termination": {"code": "cost_converged"}, "gradient": [1.0, 1e-9],
+                "linear_iterations": [0, 4, 8]}
+        runs = [{**canned_run("sheaf", [[0.1, 500.0], [autos, 100.0]], 100.0), "config": "auto",
+                 "sheaf": said},
+                {**canned_run("sheaf", [[0.1, 500.0], [others, 100.0]], 100.0), "config": "sparse"},
+                canned_run("g2o", [[0.1, 500.0], [6.0, peer]], peer, cut=peer > 100, limit_s=7)]
+        return {"problem": name, "threads": 1, "best_cost": 100.0, "runs": runs, "missing": ["pba"],
+                "header": {"cameras": cameras, "points": 2, "observations": 30 * cameras},
+                "summary": run_table.summarise(runs, 100.0), "synthetic": True, "time_limit_s": 7}
+    return {"date": "2026-01-01", "runs": 1, "problems": [document("a", 10, 2.0, 2.0, 100.0),
+                                                          document("b", 1000, 4.0, 1.0, 150.0)]}
+
+
+def check_suite():
+    results = canned_ladder()
+    documents = suite_report.full(results)
+    assert suite_report.profile(documents, 1e-3) == {"sheaf auto": [1.0, 1.0],
+                                                     "g2o": [3.0, math.inf]}
+    assert "| a | 1 | 2.00 | 6.00 | **3.0** |" in suite_report.speed_table(documents, 1e-3)
+    assert "| b | 1 | 4.00 | > 7 |  |" in suite_report.speed_table(documents, 1e-3)
+    assert "| b | 1 | dense | 4.00 |  | 1.00 |  |  | 4.00 |" in suite_report.choice_table(
+        documents, 1e-3)
+    assert "| a | 1 | 0.90 | 1 |" in suite_report.memory_table(documents)
+    assert "| a | cost_converged | double | 1 | 6 | 8 |" in suite_report.end_table(documents)
+    drawn = suite_report.plots(results)
+    assert {"suite-profile-0.001.svg", "suite-growth.svg", "a-1.svg", "b-1.svg"} <= set(drawn)
+    for svg in drawn.values():
+        xml.dom.minidom.parseString(svg)
+    section = suite_report.markdown(results, "plots")
+    assert "Not on this machine: pba." in section
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "page.md")
+        with open(path, "w") as file:
+            file.write("before\n")
+        for _ in range(2):  # the second one replaces the first
+            suite_report.put(path, section)
+        with open(path) as file:
+            page = file.read()
+        assert page.startswith("before\n") and page.count("## The ladder") == 1
+        assert suite_report.cut(page).startswith(suite_report.BEGIN)
+
+
+def check_ladder():
+    assert [suite.time_limit(n) for n in (80_000, 1_000_000, 5_000_000)] == [20, 60, 240]
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "tiny.txt")
+        with open(path, "w") as file:
+            file.write(TINY.replace("10 0 0", "10 0 0.25"))
+        made = suite.without_k2("tiny", path, folder)
+        _, cameras, points = evaluate.read_bal(made)
+        assert [cameras[8], cameras[17], cameras[16]] == [0, 0, 0.5] and len(points) == 6
+
+
 def run():
-    for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages):
+    for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages,
+                  check_suite, check_ladder):
         check()
         print(f"{check.__name__}: passed")
     return 0
