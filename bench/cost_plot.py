@@ -77,8 +77,9 @@ def mark(kind, x, y, colour):
 def tick_text(value):
     if value == 0 or 1e-3 <= value <= 1e3:
         return f"{value:g}"
-    exponent = round(math.log10(value))
-    return f'10<tspan dy="-5" font-size="9">{exponent}</tspan>'
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digit = round(value / 10.0 ** exponent)
+    return (f"{digit}·" if digit > 1 else "") + f'10<tspan dy="-5" font-size="9">{exponent}</tspan>'
 
 
 def grid(x, y):
