@@ -76,13 +76,11 @@ void run(const peer::Arguments& arguments, const rootba::SolverOptions& options,
   auto problem = make_problem<Scalar>(file);
   rootba::SolverSummary summary;
   std::size_t seen = 0;
-  double held = 0;  // cost of the state it holds
   const auto take_new_steps = [&] {
     for (; seen < summary.iterations.size(); ++seen) {
       const auto& step = summary.iterations[seen];
       if (seen == 0) record.setup_done_at(summary.preprocessor_time_in_seconds);
-      if (step.step_is_successful) held = step.cost.all.error;
-      record.add_at(step.cumulative_time_in_seconds, held, step.step_is_successful);
+      record.add_at(step.cumulative_time_in_seconds, step.cost.all.error, step.step_is_successful);
     }
   };
   record.start();

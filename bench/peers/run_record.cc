@@ -123,7 +123,8 @@ void RunRecord::add(double cost, bool accepted) { add_at(now(), cost, accepted);
 void RunRecord::add_at(double time_s, double cost, bool accepted) {
   if (accepted && !trace_.empty())
     still_ = trace_.back().second - cost <= 1e-12 * cost ? still_ + 1 : 0;
-  trace_.emplace_back(time_s, cost);
+  // What was tried and refused is nobody's state.
+  trace_.emplace_back(time_s, accepted || trace_.empty() ? cost : trace_.back().second);
 }
 
 void RunRecord::finish() {
