@@ -53,6 +53,12 @@ def ratio(value, ours):
     return f"**{value / ours:.1f}**" if math.isfinite(value) and math.isfinite(ours) else ""
 
 
+def at_least(row, ours):
+    """What is known of the ratio of a run that the time limit ended."""
+    limit = row.get("limit_s")
+    return f"> {limit / ours:.1f}" if limit and limit > ours else ""
+
+
 def problem_table(results):
     rows = []
     for d in {d["problem"]: d for d in results["problems"]}.values():
@@ -76,7 +82,7 @@ def speed_table(documents, tau):
             row = best(d, name, tau)
             cells += ["", ""] if row is None else [
                 run_table.reached(row, tau) if row["runs"] or row.get("limit_s") else "failed",
-                ratio(at(row, tau), at(ours, tau))]
+                ratio(at(row, tau), at(ours, tau)) or at_least(row, at(ours, tau))]
         rows.append(cells)
     return table(head, rows)
 
