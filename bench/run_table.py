@@ -110,3 +110,12 @@ def strongest(rows, name, tau="1e-06"):
     """The row of solver `name` that is quickest to f*(1 + tau), None when it has none there."""
     rows = [r for r in rows if r["name"] == name and r["runs"] and r["time_to"][tau] is not None]
     return min(rows, key=lambda r: r["time_to"][tau], default=None)
+
+
+def machine_text(machine):
+    words = [machine["cpu"], f"{machine['cores']} cores"]
+    if "double_gflops" in machine:
+        simd = "AVX-512" if machine["simd"].startswith("AVX3") else machine["simd"]
+        words += [simd, f"{machine['double_gflops']['one']:.0f} Gflop/s double a core",
+                  f"{machine['triad_gbytes_s']['all']:.0f} GB/s"]
+    return ", ".join(words)

@@ -141,8 +141,9 @@ def canned_ladder():
         return {"problem": name, "threads": 1, "best_cost": 100.0, "runs": runs, "missing": ["pba"],
                 "header": {"cameras": cameras, "points": 2, "observations": 30 * cameras},
                 "summary": run_table.summarise(runs, 100.0), "synthetic": True, "time_limit_s": 7}
-    return {"date": "2026-01-01", "runs": 1, "problems": [document("a", 10, 2.0, 2.0, 100.0),
-                                                          document("b", 1000, 4.0, 1.0, 150.0)]}
+    return {"date": "2026-01-01", "runs": 1, "machine": {"cpu": "a cpu", "cores": 2},
+            "problems": [document("a", 10, 2.0, 2.0, 100.0),
+                         document("b", 1000, 4.0, 1.0, 150.0)]}
 
 
 def check_suite():

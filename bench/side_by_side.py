@@ -85,7 +85,10 @@ def run_once(program, name, config, problem, threads, options, folder):
     if done.returncode != 0:
         words = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         return {**run, "failed": words[0]}
-    run.update(json.loads(done.stdout))
+    try:
+        run.update(json.loads(done.stdout))
+    except ValueError:  # a cost that is not a number, for one
+        return {**run, "failed": f"wrote no JSON: {done.stdout.strip()[-60:]}"}
     run["cut"] = run["total_s"] >= limit
     run["final_cost_independent"] = evaluate.cost(problem, final,
                                                   find_program("evaluate", options.peers))

@@ -199,7 +199,7 @@ def main():
     path = os.path.join(options.out, "results.json")
     results = {"version": 1, "date": time.strftime("%Y-%m-%d"), "runs": options.runs,
                "machine": side_by_side.machine(options.machine), "problems": []}
-    if options.resume or options.render:
+    if (options.resume or options.render) and os.path.exists(path):
         with open(path) as file:
             results = json.load(file)
     if not options.render:

@@ -270,7 +270,8 @@ def markdown(results, folder):
            "\"Synthetic\" problems are our own scenes of the size and kind of the published problem "
            "of that name (`sheaf generate --like`), not that problem. \"miss\": the solver stopped "
            "by itself before the target; \"> 60\": the limit of 60 s ended it. Each peer stands "
-           "with its quickest configuration for each problem, sheaf with what `auto` chose.\n",
+           "with its quickest configuration for each problem, sheaf with what `auto` chose. "
+           f"Machine: {run_table.machine_text(results['machine'])}.\n",
            problem_table(results)]
     for tau in TARGETS:
         out += [f"### Seconds to {tau:g} of the best cost\n", speed_table(documents, tau),

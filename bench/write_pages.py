@@ -21,15 +21,6 @@ PEERS = (("ceres-head", "Ceres HEAD"), ("ceres-2.1", "Ceres 2.1"), ("g2o", "g2o"
          ("gtsam", "GTSAM"))
 
 
-def machine_text(machine):
-    words = [machine["cpu"], f"{machine['cores']} cores"]
-    if "double_gflops" in machine:
-        simd = "AVX-512" if machine["simd"].startswith("AVX3") else machine["simd"]
-        words += [simd, f"{machine['double_gflops']['one']:.0f} Gflop/s double a core",
-                  f"{machine['triad_gbytes_s']['all']:.0f} GB/s"]
-    return ", ".join(words)
-
-
 def stem(document):
     return os.path.splitext(document["problem"])[0]
 
@@ -53,7 +44,7 @@ def readme_table(results):
             f"included, reading left out; medians of {results['runs']} interleaved runs. For each "
             f"solver its quickest configuration measured. **Only the ratios (in bold) carry over "
             f"to other machines; the seconds are those of this one:** "
-            f"{machine_text(results['machine'])}; {results['date']}. Ceres HEAD and g2o were built "
+            f"{run_table.machine_text(results['machine'])}; {results['date']}. Ceres HEAD and g2o were built "
             f"natively for it, with derivatives by hand; Ceres 2.1 is Debian's package. "
             f"All configurations, targets and misses: [BENCHMARKS.md](BENCHMARKS.md).")
     return "\n".join(lines) + "\n\n" + note + "\n"
@@ -97,7 +88,7 @@ def page(results, plots, kernels=None):
     out = ["# Benchmarks\n",
            "Written by `bench/regenerate.sh` (and its ladder by `bench/suite.py`); do not edit. How it is measured: "
            "[bench/README.md](bench/README.md).\n",
-           f"Machine: {machine_text(machine)}. {results['date']}. Medians of {results['runs']} "
+           f"Machine: {run_table.machine_text(machine)}. {results['date']}. Medians of {results['runs']} "
            "interleaved runs in fresh processes. Times are seconds until the cost is at or below "
            "f* (1 + tau), f* the best cost anyone found, set-up included, reading left out; "
            "\"miss\": never. Cost is 1/2 sum |r|^2, 9-parameter cameras, no loss. \"Final cost\" is "

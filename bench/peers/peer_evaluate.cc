@@ -4,8 +4,12 @@
 // No solver: the cost of a state on the observations of the original file, for files that are too
 // large for evaluate.py in plain Python. Shares nothing with the engine.
 //   peer-evaluate ORIGINAL.txt FINAL.txt
+//   peer-evaluate --test                      checks how the peers' rotations are written
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <random>
 
 #include "bal_camera.h"
 #include "bal_file.h"
@@ -33,11 +37,34 @@ double cost(const peer::BalFile& original, const peer::BalFile& state) {
   return 0.5 * (sum + lost);
 }
 
+/// Angle-axis vectors from nothing to half a turn, through a matrix that lost digits as floats do.
+int test_rotations() {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  const double angles[] = {0, 1e-13, 1e-6, 0.1, 1, 3, 3.14159, 3.141592653589};
+  double worst = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    double axis[3] = {normal(random), normal(random), normal(random)}, w[3], R[9], nearest[9];
+    const double length = std::hypot(axis[0], axis[1], axis[2]);
+    for (int i = 0; i < 3; ++i) w[i] = angles[trial % 8] * axis[i] / length;
+    peer::rotation(w, R, nullptr);
+    double rounded[9];
+    for (int i = 0; i < 9; ++i) rounded[i] = trial / 8 % 2 ? static_cast<float>(R[i]) : R[i];
+    peer::angle_axis(rounded, w);
+    peer::rotation(w, nearest, nullptr);
+    for (int i = 0; i < 9; ++i)
+      worst = std::max(worst, std::abs(nearest[i] - R[i]) / (trial / 8 % 2 ? 1e-7 : 1e-15));
+  }
+  std::printf("rotations come back to %.1f roundings\n", worst);
+  return worst < 5 ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 2 && !std::strcmp(argv[1], "--test")) return test_rotations();
   if (argc != 3) {
-    std::fprintf(stderr, "usage: %s ORIGINAL.txt FINAL.txt\n", argv[0]);
+    std::fprintf(stderr, "usage: %s ORIGINAL.txt FINAL.txt\n       %s --test\n", argv[0], argv[0]);
     return 2;
   }
   peer::BalFile original, state;
