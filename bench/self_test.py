@@ -140,8 +140,9 @@ def canned_ladder():
                 canned_run("g2o", [[0.1, 500.0], [6.0, peer]], peer, cut=peer > 100, limit_s=7)]
         return {"problem": name, "threads": 1, "best_cost": 100.0, "runs": runs, "missing": ["pba"],
                 "header": {"cameras": cameras, "points": 2, "observations": 30 * cameras},
-                "summary": run_table.summarise(runs, 100.0), "synthetic": True, "time_limit_s": 7}
-    return {"date": "2026-01-01", "runs": 1, "machine": {"cpu": "a cpu", "cores": 2},
+                "summary": run_table.summarise(runs, 100.0), "synthetic": True, "time_limit_s": 7,
+                "turns": 3}
+    return {"date": "2026-01-01", "machine": {"cpu": "a cpu", "cores": 2},
             "problems": [document("a", 10, 2.0, 2.0, 100.0),
                          document("b", 1000, 4.0, 1.0, 150.0)]}
 
@@ -176,6 +177,10 @@ def check_suite():
 
 
 def check_ladder():
+    documents = canned_ladder()["problems"]
+    documents[0]["best_cost"] = 50.0
+    suite.share_best_cost(documents)
+    assert documents[1]["best_cost"] == 50 and documents[1]["summary"][0]["time_to"]["0.1"] is None
     assert [suite.time_limit(n) for n in (80_000, 1_000_000, 5_000_000)] == [20, 60, 240]
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "tiny.txt")

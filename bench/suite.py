@@ -23,6 +23,7 @@ import sys
 import tempfile
 import time
 
+import run_table
 import side_by_side
 import suite_report
 
@@ -137,7 +138,7 @@ def measure(name, path, text, threads, options):
     mine.time_limit = options.time_limit or time_limit(header["observations"])
     document = side_by_side.compare(path, solvers, threads, mine)
     document.update(problem=name, missing=missing, synthetic=LADDER.get(name.removesuffix("-k2zero"))
-                    is None, time_limit_s=mine.time_limit)
+                    is None, time_limit_s=mine.time_limit, turns=options.runs)
     return document
 
 
@@ -167,7 +168,24 @@ def run(options, results, path):
             if (name, threads) in done or time.time() > options.deadline:
                 continue
             results["problems"].append(measure(name, file, text, threads, options))
+            results["problems"].sort(key=place)
+            share_best_cost([d for d in results["problems"] if d["problem"] == name])
             write_beside(path, lambda beside: dump(results, beside))
+
+
+def share_best_cost(documents):
+    """f* is the best anyone found with any count of threads."""
+    best = min((d["best_cost"] for d in documents if math.isfinite(d["best_cost"])),
+               default=math.nan)
+    for document in documents:
+        document["best_cost"] = best
+        document["summary"] = run_table.summarise(document["runs"], best)
+
+
+def place(document):
+    """On the ladder: by size, the k2 = 0 copy after its original, then by threads."""
+    name = document["problem"].removesuffix("-k2zero")
+    return ([*LADDER, *OURS_ALONE].index(name), document["problem"], document["threads"])
 
 
 def dump(results, path):
@@ -197,7 +215,7 @@ def main():
     options.optimum = math.inf
     options.deadline = time.time() + 60 * options.budget_minutes
     path = os.path.join(options.out, "results.json")
-    results = {"version": 1, "date": time.strftime("%Y-%m-%d"), "runs": options.runs,
+    results = {"version": 1, "date": time.strftime("%Y-%m-%d"),
                "machine": side_by_side.machine(options.machine), "problems": []}
     if (options.resume or options.render) and os.path.exists(path):
         with open(path) as file:

@@ -65,9 +65,10 @@ def problem_table(results):
         counts = [f"{d['header'][k]}" for k in ("cameras", "points", "observations")]
         kind = "synthetic" if d["synthetic"] else "real"
         same = [e["best_cost"] for e in results["problems"] if e["problem"] == d["problem"]]
-        rows.append([d["problem"], kind, *counts, f"{min(same):.6g}", f"{d['time_limit_s']:g}"])
+        rows.append([d["problem"], kind, *counts, f"{min(same):.6g}", f"{d['time_limit_s']:g}",
+                     str(d["turns"])])
     return table(["problem", "kind", "cameras", "points", "observations", "best cost",
-                  "limit, s"], rows, 2)
+                  "limit, s", "runs"], rows, 2)
 
 
 def speed_table(documents, tau):
@@ -265,8 +266,8 @@ def markdown(results, folder):
     documents = full(results)
     small = [d for d in results["problems"] if d["problem"].endswith(WITHOUT_K2)]
     out = ["## The ladder\n",
-           f"Written by `bench/suite.py`, {results['date']}; medians of {results['runs']} "
-           "interleaved runs in fresh processes, the rules of [bench/README.md](bench/README.md). "
+           f"Written by `bench/suite.py`, {results['date']}; medians of interleaved runs in fresh "
+           "processes, as many as the table says; the rules of [bench/README.md](bench/README.md). "
            "\"Synthetic\" problems are our own scenes of the size and kind of the published problem "
            "of that name (`sheaf generate --like`), not that problem. \"miss\": the solver stopped "
            "by itself before the target; \"> 60\": the limit of 60 s ended it. Each peer stands "
