@@ -42,6 +42,7 @@ Json options_json(const SolveArguments& a) {
           {"solver", a.solver},
           {"memory_limit_bytes", a.memory_limit_bytes},
           {"initial_damping", a.initial_damping},
+          {"inner_iterations", a.inner_iterations},
           {"simd", a.simd}};
 }
 

@@ -57,6 +57,39 @@ bool parse_fix_item(std::string_view item, Fixed& out) {
   return false;
 }
 
+void add_solver_options(CLI::App& verb, SolveArguments& a) {
+  const double most = std::numeric_limits<double>::max();
+  verb.add_option("--solver", a.solver,
+                  "how the camera system is solved: auto (by counted work), dense (formed, "
+                  "Cholesky), sparse (formed by blocks, Cholesky in an order that keeps fill low), "
+                  "iterative (conjugate gradients; iterative-explicit on the formed blocks, "
+                  "iterative-implicit with nothing formed)")
+      ->type_name("NAME")
+      ->check(one_of(
+          {"auto", "dense", "sparse", "iterative", "iterative-explicit", "iterative-implicit"}))
+      ->capture_default_str();
+  verb.add_option("--memory-limit", a.memory_limit_bytes,
+                  "take a leaner solver, or refuse (exit 5), rather than exceed this many bytes; "
+                  "units K, M, G are powers of 1024")
+      ->type_name("BYTES")
+      ->transform(CLI::AsSizeValue(false));
+  verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
+      ->type_name("LAMBDA")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--inner-iterations", a.inner_iterations,
+                  "at most so many Gauss-Newton steps of each point by itself in every step, once "
+                  "the cameras have stepped; 0: none")
+      ->type_name("N")
+      ->check(whole_number_from(0, "a whole number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--simd", a.simd,
+                  "instruction set: best, scalar, sse4, avx2, avx512 (for tests and measurements)")
+      ->type_name("NAME")
+      ->check(one_of({"best", "scalar", "sse4", "avx2", "avx512"}))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 std::string parse_fix(const std::string& list, Fixed& out) {
@@ -110,29 +143,7 @@ void add_solve_options(CLI::App& verb, SolveArguments& a) {
             return parse_fix(text, ignored);
           },
           ""));
-  verb.add_option("--solver", a.solver,
-                  "how the camera system is solved: auto (by counted work), dense (formed, "
-                  "Cholesky), sparse (formed by blocks, Cholesky in an order that keeps fill low), "
-                  "iterative (conjugate gradients; iterative-explicit on the formed blocks, "
-                  "iterative-implicit with nothing formed)")
-      ->type_name("NAME")
-      ->check(one_of(
-          {"auto", "dense", "sparse", "iterative", "iterative-explicit", "iterative-implicit"}))
-      ->capture_default_str();
-  verb.add_option("--memory-limit", a.memory_limit_bytes,
-                  "take a leaner solver, or refuse (exit 5), rather than exceed this many bytes; "
-                  "units K, M, G are powers of 1024")
-      ->type_name("BYTES")
-      ->transform(CLI::AsSizeValue(false));
-  verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
-      ->type_name("LAMBDA")
-      ->check(number_in(0, most, true, "a number from 0 up"))
-      ->capture_default_str();
-  verb.add_option("--simd", a.simd,
-                  "instruction set: best, scalar, sse4, avx2, avx512 (for tests and measurements)")
-      ->type_name("NAME")
-      ->check(one_of({"best", "scalar", "sse4", "avx2", "avx512"}))
-      ->capture_default_str();
+  add_solver_options(verb, a);
 }
 
 SolveOptions solve_options(const SolveArguments& a) {
@@ -145,6 +156,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   options.solver = kSolvers.at(a.solver);
   options.memory_limit_bytes = a.memory_limit_bytes;
   options.initial_damping = a.initial_damping;
+  options.inner_iterations = a.inner_iterations;
   options.simd = kSimds.at(a.simd);
   return options;
 }

@@ -44,7 +44,10 @@ struct SolveOptions {
   CameraSolverKind solver = CameraSolverKind::automatic;
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   double initial_damping = 0;            ///< 0: the default rule
-  Simd simd = Simd::best;                ///< for tests and measurements
+  /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras
+  /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
+  int inner_iterations = 3;
+  Simd simd = Simd::best;  ///< for tests and measurements
 
   /// Called once the solver is chosen and before it allocates: solver, reason and forecast are set.
   std::function<void(const Summary&)> on_plan{};

@@ -31,15 +31,14 @@ ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_tr
 }  // namespace
 
 BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns columns,
-                           bool points_held, bool watch_behind, SolverKind kind,
-                           const Kernels& kernels, Threads& threads)
-    : points_held_(points_held),
-      watch_behind_(watch_behind),
+                           const PointRules& rules, SolverKind kind, const Kernels& kernels,
+                           Threads& threads)
+    : rules_(rules),
       kernels_(kernels),
       threads_(threads),
       batches_(std::move(batches)),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              lists_for(kind, points_held, batches_.longest_track))),
+                              lists_for(kind, rules.held, batches_.longest_track))),
       columns_(std::move(columns)) {
   fill_state(problem);
   const std::size_t slices = chunks_.slices.size() - 1;
@@ -106,7 +105,7 @@ Step BundleSystem::propose(const StepRequest& request) {
   const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
   const EliminateInput in{&batches_,      &chunks_,        cameras_.data(),
-                          points_.data(), request.damping, points_held_};
+                          points_.data(), request.damping, rules_.held};
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[threads_.worker()];
@@ -154,6 +153,7 @@ Step BundleSystem::collect_step(const StepRequest& request,
     gradient2 = std::max(gradient2, out.gradient_max2);
   }
   step.cost = square_sum / 2;
+  mean_square_ = square_sum / static_cast<double>(batches_.observations);
   // w is whitened by V (1 + damping): undo the damping's part.
   step.gradient_max = std::sqrt(gradient2 * (1 + request.damping));
   vectors_.gather({&chunks_, tiles_.data(), diagonal_.data()}, columns_);
@@ -221,8 +221,14 @@ Trial BundleSystem::trial() {
   Trial out;
   out.step_norm = step_cameras();
   const std::size_t slices = chunks_.slices.size() - 1;
-  const TrialInput in{&batches_,      cameras_.data(), trial_cameras_.data(),
-                      points_.data(), factors_.data(), watch_behind_};
+  const TrialInput in{&batches_,
+                      cameras_.data(),
+                      trial_cameras_.data(),
+                      points_.data(),
+                      factors_.data(),
+                      rules_.watch_behind,
+                      rules_.held ? 0 : rules_.inner_iterations,
+                      mean_square_};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};

@@ -19,14 +19,21 @@
 
 namespace sheaf {
 
+/// What happens to the points in a step.
+struct PointRules {
+  bool held = false;
+  /// Count in each trial the observations that newly go behind their camera.
+  bool watch_behind = false;
+  int inner_iterations = 0;  ///< of each point by itself, once the cameras have stepped
+};
+
 /// Reprojection rows on CPU threads. The order of every sum is fixed by the problem: chunks within
 /// a slice in order, slices in order; so the bytes do not depend on the number of threads.
 class BundleSystem : public System {
  public:
-  /// watch_behind: count in each trial the observations that newly go behind their camera.
   /// Throws std::bad_alloc.
-  BundleSystem(const Problem& problem, Batches batches, Columns columns, bool points_held,
-               bool watch_behind, SolverKind kind, const Kernels& kernels, Threads& threads);
+  BundleSystem(const Problem& problem, Batches batches, Columns columns, const PointRules& rules,
+               SolverKind kind, const Kernels& kernels, Threads& threads);
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;
@@ -46,7 +53,7 @@ class BundleSystem : public System {
   bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();
 
-  const bool points_held_, watch_behind_;
+  const PointRules rules_;
   const Kernels& kernels_;
   Threads& threads_;
   Batches batches_;
@@ -66,6 +73,7 @@ class BundleSystem : public System {
   CameraVectors vectors_;
   Buffer<double> damping_, camera_step_;
   std::unique_ptr<CameraSolver> solver_;
+  double mean_square_ = 0;  ///< of a residual at the held state
   double point_decrease_ = 0;
 };
 

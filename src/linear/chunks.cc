@@ -16,25 +16,30 @@ class TileNumbers {
   TileNumbers(const Batches& batches, std::uint32_t num_images) : images_(num_images) {
     dense_ = images_ <= kDenseImages;
     if (dense_) number_.assign(std::size_t(images_) * (images_ + 1) / 2, kNone);
-    std::vector<std::uint32_t> previous, set;
-    for (std::size_t g = 0; g < batches.groups.size(); ++g) {
-      const Batches::Group& group = batches.groups[g];
-      for (std::uint32_t l = 0; l < group.lanes; ++l) {
-        set.clear();
-        for (std::uint32_t o = 0; o < group.track; ++o)
-          set.push_back(batches.image[8 * (group.first_batch + o) + l]);
-        if (set == previous) continue;  // sorted by image set: most points repeat the last one's
-        for (std::size_t i = 0; i < set.size(); ++i)
-          for (std::size_t j = 0; j < i; ++j) mark(set[i], set[j]);
-        previous.swap(set);
-      }
-    }
+    for_each_image_set(batches, [&](const std::vector<std::uint32_t>& set) {
+      for (std::size_t i = 0; i < set.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j) mark(set[i], set[j]);
+    });
     assign();
   }
 
-  std::uint32_t at(std::uint32_t row, std::uint32_t column) const {
-    return dense_ ? number_[triangular(row, column)] : sparse_.at(key(row, column));
-  }
+  /// The numbers of one image's tiles; at(column) for columns up to the image.
+  class Row {
+   public:
+    Row(const TileNumbers& numbers, std::uint32_t row)
+        : dense_(numbers.dense_ ? &numbers.number_[triangular(row, 0)] : nullptr),
+          sparse_(numbers.sparse_),
+          row_(row) {}
+    std::uint32_t at(std::uint32_t column) const {
+      return dense_ != nullptr ? dense_[column] : sparse_.at(key(row_, column));
+    }
+
+   private:
+    const std::uint32_t* dense_;
+    const std::unordered_map<std::uint64_t, std::uint32_t>& sparse_;
+    std::uint32_t row_;
+  };
+  Row row(std::uint32_t image) const { return Row(*this, image); }
   std::vector<Tile> take_tiles() { return std::move(tiles_); }
 
  private:
@@ -99,6 +104,7 @@ class Runs {
     }
   }
   void start(std::uint64_t base) { base_ = base; }
+  /// Where the key's next item goes.
   std::uint64_t place(std::uint32_t key) { return base_ + count_[key]++; }
   void clear() {
     for (std::uint32_t key : touched_) count_[key] = 0;
@@ -111,60 +117,84 @@ class Runs {
   std::uint64_t base_ = 0;
 };
 
-/// visit(image, local record, lane's first local record, position in the track) for each record.
+/// visit(image, local record) for each record of a chunk.
 template <class Visit>
 void for_each_record(const Batches& batches, const Chunk& chunk, const Visit& visit) {
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
-    const Batches::Group& group = batches.groups[g];
-    const std::uint64_t base = group.first_batch - chunk.first_batch;
-    for (std::uint32_t o = 0; o < group.track; ++o)
+    const Batches::Group group = batches.groups[g];
+    const std::uint64_t first = 8 * group.first_batch, chunk_first = 8 * chunk.first_batch;
+    for (std::uint64_t at = first; at < first + 8 * std::uint64_t(group.track); at += 8)
       for (std::uint32_t l = 0; l < group.lanes; ++l)
-        visit(group.first_batch, static_cast<std::uint16_t>(8 * (base + o) + l), o, l);
+        visit(batches.image[at + l], static_cast<std::uint16_t>(at - chunk_first + l));
   }
 }
 
-void list_diagonal(const Batches& batches, Chunk& chunk, Runs& runs, Chunks& out) {
-  runs.start(out.diagonal.size());
-  for_each_record(batches, chunk, [&](std::uint64_t first, std::uint16_t, auto o, auto l) {
-    runs.count(batches.image[8 * (first + o) + l]);
-  });
+/// visit(images of the lane, local record, o) for each record with the position o in its track:
+/// its partners are the o records before it, eight apart, of images[0], images[8], ...
+template <class Visit>
+void for_each_partnered(const Batches& batches, const Chunk& chunk, const Visit& visit) {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group group = batches.groups[g];
+    const std::uint64_t base = 8 * (group.first_batch - chunk.first_batch);
+    const std::uint32_t* images = &batches.image[8 * group.first_batch];
+    for (std::uint32_t o = 1; o < group.track; ++o)
+      for (std::uint32_t l = 0; l < group.lanes; ++l)
+        visit(images + l, static_cast<std::uint16_t>(base + 8 * std::uint64_t(o) + l), o);
+  }
+}
+
+void list_diagonal(const Batches& batches, Chunk& chunk, Runs& runs, std::uint64_t& listed,
+                   Chunks& out) {
+  runs.start(listed);
+  for_each_record(batches, chunk, [&](std::uint32_t image, std::uint16_t) { runs.count(image); });
   chunk.first_diagonal_run = out.diagonal_runs.size();
-  std::uint64_t total = 0;
-  runs.close(out.diagonal.size(), [&](std::uint32_t image, std::uint32_t n, std::uint64_t at) {
+  runs.close(listed, [&](std::uint32_t image, std::uint32_t n, std::uint64_t at) {
     out.diagonal_runs.push_back({image, n, at});
-    total += n;
+    listed += n;
   });
   chunk.end_diagonal_run = out.diagonal_runs.size();
-  out.diagonal.resize(out.diagonal.size() + total);
-  for_each_record(batches, chunk, [&](std::uint64_t first, std::uint16_t r, auto o, auto l) {
-    out.diagonal[runs.place(batches.image[8 * (first + o) + l])] = r;
+  std::uint16_t* diagonal = out.diagonal.data();
+  for_each_record(batches, chunk, [&](std::uint32_t image, std::uint16_t record) {
+    diagonal[runs.place(image)] = record;
   });
   runs.clear();
 }
 
+/// `tile_of` has room for the pairs of any chunk.
 void list_pairs(const Batches& batches, const TileNumbers& numbers, Chunk& chunk, Runs& runs,
-                std::vector<std::uint32_t>& tile_of, Chunks& out) {
-  tile_of.clear();
-  runs.start(out.pairs.size());
-  for_each_record(batches, chunk, [&](std::uint64_t first, std::uint16_t, auto o, auto l) {
-    const std::uint32_t* image = &batches.image[8 * first + l];
+                Buffer<std::uint32_t>& tile_of, std::uint64_t& listed, Chunks& out) {
+  runs.start(listed);
+  std::uint32_t* tile = tile_of.data();
+  for_each_partnered(batches, chunk, [&](const std::uint32_t* images, std::uint16_t, auto o) {
+    const TileNumbers::Row row = numbers.row(images[8 * o]);
     for (std::uint32_t i = 0; i < o; ++i) {
-      tile_of.push_back(numbers.at(image[8 * o], image[8 * i]));
-      runs.count(tile_of.back());
+      *tile = row.at(images[8 * i]);
+      runs.count(*tile++);
     }
   });
   chunk.first_pair_run = out.pair_runs.size();
-  runs.close(out.pairs.size(), [&](std::uint32_t tile, std::uint32_t n, std::uint64_t at) {
-    out.pair_runs.push_back({tile, n, at});
+  runs.close(listed, [&](std::uint32_t tile_number, std::uint32_t n, std::uint64_t at) {
+    out.pair_runs.push_back({tile_number, n, at});
+    listed += n;
   });
   chunk.end_pair_run = out.pair_runs.size();
-  out.pairs.resize(out.pairs.size() + tile_of.size());
-  std::size_t next = 0;
-  for_each_record(batches, chunk, [&](std::uint64_t, std::uint16_t r, auto o, auto) {
+  tile = tile_of.data();
+  RecordPair* pairs = out.pairs.data();
+  for_each_partnered(batches, chunk, [&](const std::uint32_t*, std::uint16_t record, auto o) {
     for (std::uint32_t i = 0; i < o; ++i)
-      out.pairs[runs.place(tile_of[next++])] = {r, static_cast<std::uint16_t>(r - 8 * (o - i))};
+      pairs[runs.place(*tile++)] = {record, static_cast<std::uint16_t>(record - 8 * (o - i))};
   });
   runs.clear();
+}
+
+/// Pairs of records in a chunk.
+std::uint64_t count_pairs(const Batches& batches, const Chunk& chunk) {
+  std::uint64_t pairs = 0;
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group& group = batches.groups[g];
+    pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
+  }
+  return pairs;
 }
 
 std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_images) {
@@ -206,20 +236,25 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLi
     out.chunks.push_back(chunk);
   }
   if (lists != ChunkLists::none) {
-    out.diagonal.reserve(batches.observations);
+    out.diagonal.allocate(batches.observations);
     Runs by_image(num_images);
-    for (Chunk& chunk : out.chunks) list_diagonal(batches, chunk, by_image, out);
+    std::uint64_t listed = 0;
+    for (Chunk& chunk : out.chunks) list_diagonal(batches, chunk, by_image, listed, out);
   }
   if (lists == ChunkLists::pairs) {
     TileNumbers numbers(batches, num_images);
     out.tiles = numbers.take_tiles();
-    std::uint64_t pairs = 0;
-    for (const Batches::Group& group : batches.groups)
-      pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
-    out.pairs.reserve(pairs);
+    std::uint64_t pairs = 0, most = 0;
+    for (const Chunk& chunk : out.chunks) {
+      const std::uint64_t here = count_pairs(batches, chunk);
+      pairs += here, most = std::max(most, here);
+    }
+    out.pairs.allocate(pairs);
+    Buffer<std::uint32_t> tile_of(most);
     Runs by_tile(out.tiles.size());
-    std::vector<std::uint32_t> tile_of;
-    for (Chunk& chunk : out.chunks) list_pairs(batches, numbers, chunk, by_tile, tile_of, out);
+    std::uint64_t listed = 0;
+    for (Chunk& chunk : out.chunks)
+      list_pairs(batches, numbers, chunk, by_tile, tile_of, listed, out);
   }
   out.slices = cut_into_slices(out, num_images);
   return out;

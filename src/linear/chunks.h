@@ -49,10 +49,10 @@ struct Chunks {
   std::vector<Chunk> chunks;
   std::vector<Tile> tiles;
   std::vector<PairRun> pair_runs;
-  std::vector<RecordPair> pairs;
+  Buffer<RecordPair> pairs;
   std::vector<DiagonalRun> diagonal_runs;
-  std::vector<std::uint16_t> diagonal;  ///< local record numbers
-  std::uint64_t most_batches = 0;       ///< in any chunk
+  Buffer<std::uint16_t> diagonal;  ///< local record numbers
+  std::uint64_t most_batches = 0;  ///< in any chunk
 
   /// Chunks slices[s] to slices[s + 1] add into one set of sums, in order; the sets are then added
   /// in order. The cut depends on the work in the chunks only, never on the number of threads.

@@ -15,26 +15,19 @@ namespace {
 /// is room for them in a list of kAnalysedTiles.
 std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list) {
   std::vector<std::uint64_t> marked((images * (images + 1) / 2 + 63) / 64, 0);
-  std::vector<std::uint32_t> previous, set;
   std::uint64_t tiles = 0;
-  for (const Batches::Group& group : batches.groups)
-    for (std::uint32_t l = 0; l < group.lanes; ++l) {
-      set.clear();
-      for (std::uint32_t o = 0; o < group.track; ++o)
-        set.push_back(batches.image[8 * (group.first_batch + o) + l]);
-      if (set == previous) continue;  // sorted by image set: many points repeat the last one's
-      for (std::size_t i = 0; i < set.size(); ++i)
-        for (std::size_t j = 0; j < i; ++j) {
-          const std::uint64_t at = std::uint64_t(set[i]) * (set[i] + 1) / 2 + set[j];
-          std::uint64_t& word = marked[at / 64];
-          const std::uint64_t bit = std::uint64_t(1) << (at % 64);
-          if ((word & bit) != 0) continue;
-          word |= bit;
-          if (++tiles <= WorkCounts::kAnalysedTiles)
-            list.push_back({std::max(set[i], set[j]), std::min(set[i], set[j])});
-        }
-      previous.swap(set);
-    }
+  for_each_image_set(batches, [&](const std::vector<std::uint32_t>& set) {
+    for (std::size_t i = 0; i < set.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const std::uint64_t at = std::uint64_t(set[i]) * (set[i] + 1) / 2 + set[j];
+        std::uint64_t& word = marked[at / 64];
+        const std::uint64_t bit = std::uint64_t(1) << (at % 64);
+        if ((word & bit) != 0) continue;
+        word |= bit;
+        if (++tiles <= WorkCounts::kAnalysedTiles)
+          list.push_back({std::max(set[i], set[j]), std::min(set[i], set[j])});
+      }
+  });
   return tiles;
 }
 

@@ -93,7 +93,7 @@ inline void diagonal_in_order(const Batches& batches, const Chunk& chunk, const 
 
 inline void diagonal_products(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
                               const Records& from, double* sums) {
-  if (chunks.diagonal.empty()) return diagonal_in_order(batches, chunk, from, sums);
+  if (chunks.diagonal.size() == 0) return diagonal_in_order(batches, chunk, from, sums);
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun run = chunks.diagonal_runs[i];
     diagonal_run(&chunks.diagonal[run.first], run.count, from, sums + kDiagonalDoubles * run.image);

@@ -72,6 +72,13 @@ struct Factor3 {
     y[2] = (s[2] - l20 * y[0] - l21 * y[1]) / l22;
     return y;
   }
+  Vector3<double> backward(const Vector3<double>& y) const {
+    Vector3<double> x;
+    x[2] = y[2] / l22;
+    x[1] = (y[1] - l21 * x[2]) / l11;
+    x[0] = (y[0] - l10 * x[1] - l20 * x[2]) / l00;
+    return x;
+  }
 };
 
 void store_factor(const Factor3& f, const Vector3<double>& w, const Vector3<double>& D,
@@ -192,7 +199,7 @@ void diagonal_in_order(const Batches& batches, const Chunk& chunk, const Records
 
 void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
               const Records& records, double* sums) {
-  if (chunks.diagonal.empty()) return diagonal_in_order(batches, chunk, records, sums);
+  if (chunks.diagonal.size() == 0) return diagonal_in_order(batches, chunk, records, sums);
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
     const DiagonalRun& run = chunks.diagonal_runs[i];
     for (std::uint64_t r = run.first; r < run.first + run.count; ++r) {
@@ -244,6 +251,51 @@ Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) 
   return d;
 }
 
+struct PointCost {
+  double square = 0;
+  Matrix3<double> V{};
+  Vector3<double> g{};
+};
+
+PointCost cost_of(const TrialInput& in, const Batches::Group& group, const Vector3<double>& X,
+                  std::uint32_t lane) {
+  PointCost out;
+  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+    const Row row = row_of(*in.batches, in.trial_cameras, X, b, lane);
+    for (int r = 0; r < 2; ++r) {
+      const double* J = &row.j.point[3 * r];
+      out.square += row.r[r] * row.r[r];
+      for (int i = 0; i < 3; ++i) {
+        out.g[i] -= J[i] * row.r[r];
+        for (int k = 0; k < 3; ++k) out.V[3 * i + k] += J[i] * J[k];
+      }
+    }
+  }
+  return out;
+}
+
+/// Inner iterations (kernels.h) of one point from X; returns sum |r|^2 where it ends.
+double refine_point(const TrialInput& in, const Batches::Group& group, std::uint32_t lane,
+                    const double* factor, Vector3<double>& X) {
+  PointCost best = cost_of(in, group, X, lane);
+  const double mean = in.mean_square * group.track;
+  for (int step = 0; step < in.inner_iterations; ++step) {
+    Matrix3<double> A = best.V;
+    for (int i = 0; i < 3; ++i) A[4 * i] += inner_iterations::kDamping * factor[8 * (9 + i)];
+    const Factor3 f = Factor3::of(A);
+    const Vector3<double> w = f.forward(best.g.data());
+    const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+    if (!(decrease > inner_iterations::kWorthOne * mean)) break;
+    const Vector3<double> d = f.backward(w);
+    const Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
+    const PointCost there = cost_of(in, group, Y, lane);
+    if (!(there.square < best.square)) break;
+    X = Y, best = there;
+    if (!(decrease > inner_iterations::kWorthMore * mean)) break;
+  }
+  return best.square;
+}
+
 double depth(const double* cameras, std::uint32_t image, const Vector3<double>& X) {
   const Observed o = camera_of(cameras, image);
   return multiply(o.R, X)[2] + o.t[2];
@@ -263,21 +315,20 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
   }
   const double* factor = in.factors + kFactorGroup * g + lane;
   const Vector3<double> d = real ? back_substitute(factor, s) : Vector3<double>{};
-  Vector3<double> Y;
+  Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
+  const double square = real ? refine_point(in, group, lane, factor, Y) : 0;
   double d2 = 0, x2 = 1e-300;
   for (int i = 0; i < 3; ++i) {
-    Y[i] = X[i] + d[i];
     out.points[kPointGroup * g + 8 * i + lane] = Y[i];
-    d2 += d[i] * d[i], x2 += X[i] * X[i];
+    d2 += (Y[i] - X[i]) * (Y[i] - X[i]), x2 += X[i] * X[i];
     if (real) out.damping_term += d[i] * d[i] * factor[8 * (9 + i)];
   }
   if (!real) return;
   out.step2_max = std::max(out.step2_max, d2 / x2);
+  out.square_sum += square;
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     const std::uint32_t image = batches.image[8 * b + lane];
-    const Row row = row_of(batches, in.trial_cameras, Y, b, lane);
-    out.square_sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
     if (in.count_newly_behind && depth(in.trial_cameras, image, Y) > 0 &&
         depth(in.cameras, image, X) <= 0)
       ++out.newly_behind;

@@ -89,51 +89,118 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   return sum;
 }
 
+/// The points of a part while they are refined: the best place so far and sum |r|^2 there.
+struct Refined {
+  V X0, X1, X2, square;
+};
+
+/// One pass over a group's observations at X: sum |r|^2 and, if asked for, the point's sums.
+template <bool kLinearize>
+HWY_INLINE V pass_group(const TrialInput& in, const Batches::Group& group, int lane, V X0, V X1,
+                        V X2, PointSums& sums) {
+  const Batches& batches = *in.batches;
+  V square = zero();
+  if (kLinearize) sums.clear();
+  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+    V c[16];
+    load_cameras<2>(in.trial_cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    const double* z = &batches.xy[16 * b + lane];
+    if (kLinearize) {
+      const LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), nullptr);
+      square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
+      sums.add(j);
+    } else {
+      square = hn::Add(square, squared_residual(c, see(c, X0, X1, X2), load(z), load(z + 8)));
+    }
+  }
+  return square;
+}
+
+/// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
+/// worth a pass and lower that point's own cost (kernels.h, inner_iterations).
+HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group, int lane,
+                              const double* pd, V mask, Refined& best) {
+  PointSums p;
+  best.square = pass_group<true>(in, group, lane, best.X0, best.X1, best.X2, p);
+  auto active = hn::Gt(mask, zero());
+  const double mean = in.mean_square * group.track;
+  const V worth_one = set(inner_iterations::kWorthOne * mean);
+  const V worth_more = set(inner_iterations::kWorthMore * mean);
+  const V weak = set(inner_iterations::kDamping);
+  for (int steps_left = in.inner_iterations; steps_left > 0;) {
+    const Factor f =
+        factor3(fma(weak, load(pd + 72), p.v00), p.v01, p.v02, fma(weak, load(pd + 80), p.v11),
+                p.v12, fma(weak, load(pd + 88), p.v22));
+    V w[3], d[3];
+    forward(f, p.g, w);
+    backward(f, w, d);
+    const V decrease = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
+    active = hn::And(active, hn::Gt(decrease, worth_one));
+    if (hn::AllFalse(D(), active)) return;
+    const auto far = hn::And(active, hn::Gt(decrease, worth_more));
+    steps_left = hn::AllFalse(D(), far) ? 0 : steps_left - 1;
+    const V Y0 = hn::Add(best.X0, d[0]), Y1 = hn::Add(best.X1, d[1]), Y2 = hn::Add(best.X2, d[2]);
+    const V square = steps_left > 0 ? pass_group<true>(in, group, lane, Y0, Y1, Y2, p)
+                                    : pass_group<false>(in, group, lane, Y0, Y1, Y2, p);
+    active = hn::And(active, hn::Lt(square, best.square));
+    best = {hn::IfThenElse(active, Y0, best.X0), hn::IfThenElse(active, Y1, best.X1),
+            hn::IfThenElse(active, Y2, best.X2), hn::IfThenElse(active, square, best.square)};
+    active = hn::And(active, far);
+  }
+}
+
+HWY_INLINE V count_crossed(const TrialInput& in, const Batches::Group& group, int lane,
+                           const V* before, const Refined& after) {
+  const Batches& batches = *in.batches;
+  V behind = zero();
+  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+    const std::uint32_t* image = &batches.image[8 * b + lane];
+    V c[16];
+    load_cameras<2>(in.trial_cameras, image, batches.uniform[b], c);
+    const V P2 = see(c, after.X0, after.X1, after.X2).P2;
+    load_cameras<2>(in.cameras, image, batches.uniform[b], c);
+    const V held = see(c, before[0], before[1], before[2]).P2;
+    const auto crossed = hn::And(hn::Gt(P2, zero()), hn::Le(held, zero()));
+    behind = hn::Add(behind, hn::IfThenElseZero(crossed, set(1.0)));
+  }
+  return behind;
+}
+
 HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, std::size_t g,
                            int part, double* stepped, TrialSums& sums) {
   const Batches& batches = *in.batches;
   const int lane = part * kLanes;
-  const double* X = in.points + kPointGroup * g + lane;
-  const V X0 = load(X), X1 = load(X + 8), X2 = load(X + 16);
+  const double* from = in.points + kPointGroup * g + lane;
+  const double* pd = in.factors + kFactorGroup * g + lane;
+  const V X[3] = {load(from), load(from + 8), load(from + 16)};
   V s[3] = {zero(), zero(), zero()};
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     V c[24];
     load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-    add_coupled(c, see(c, X0, X1, X2), s);
+    add_coupled(c, see(c, X[0], X[1], X[2]), s);
   }
   V d[3];
   const V mask = lane_mask(group.lanes, lane);
   if (group.lanes < 8)  // masked lanes stay where they are
     for (V& x : s) x = hn::Mul(x, mask);
-  const V damping = back_substitute(in.factors + kFactorGroup * g + lane, s, d);
-  const V Y0 = hn::Add(X0, d[0]), Y1 = hn::Add(X1, d[1]), Y2 = hn::Add(X2, d[2]);
+  const V damping = back_substitute(pd, s, d);
+  Refined y{hn::Add(X[0], d[0]), hn::Add(X[1], d[1]), hn::Add(X[2], d[2]), zero()};
+  PointSums unused;
+  if (in.inner_iterations > 0)
+    refine_points(in, group, lane, pd, mask, y);
+  else
+    y.square = pass_group<false>(in, group, lane, y.X0, y.X1, y.X2, unused);
   double* Y = stepped + kPointGroup * g + lane;
-  store(Y0, Y), store(Y1, Y + 8), store(Y2, Y + 16);
-  const V d2 = fma(d[0], d[0], fma(d[1], d[1], hn::Mul(d[2], d[2])));
-  const V x2 = fma(X0, X0, fma(X1, X1, fma(X2, X2, set(1e-300))));
-  V square = zero(), behind = zero();
-  for (std::uint32_t o = 0; o < group.track; ++o) {
-    const std::uint64_t b = group.first_batch + o;
-    V c[16];
-    load_cameras<2>(in.trial_cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-    const double* z = &batches.xy[16 * b + lane];
-    const Seen seen = see(c, Y0, Y1, Y2);
-    square = hn::Add(square, squared_residual(c, seen, load(z), load(z + 8)));
-    if (in.count_newly_behind) {
-      load_cameras<2>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-      const auto crossed = hn::And(hn::Gt(seen.P2, zero()), hn::Le(see(c, X0, X1, X2).P2, zero()));
-      behind = hn::Add(behind, hn::IfThenElseZero(crossed, set(1.0)));
-    }
-  }
-  if (group.lanes < 8) {
-    square = hn::Mul(square, mask);
-    behind = hn::Mul(behind, mask);
-  }
-  sums.square[part] = hn::Add(sums.square[part], square);
-  sums.behind[part] = hn::Add(sums.behind[part], behind);
+  store(y.X0, Y), store(y.X1, Y + 8), store(y.X2, Y + 16);
+  const V d0 = hn::Sub(y.X0, X[0]), d1 = hn::Sub(y.X1, X[1]), d2 = hn::Sub(y.X2, X[2]);
+  const V moved = fma(d0, d0, fma(d1, d1, hn::Mul(d2, d2)));
+  const V x2 = fma(X[0], X[0], fma(X[1], X[1], fma(X[2], X[2], set(1e-300))));
+  sums.square[part] = fma(y.square, mask, sums.square[part]);
   sums.damping[part] = fma(damping, mask, sums.damping[part]);
-  sums.step2[part] = hn::Max(sums.step2[part], hn::Div(d2, x2));
+  sums.step2[part] = hn::Max(sums.step2[part], hn::Div(moved, x2));
+  if (in.count_newly_behind)
+    sums.behind[part] = fma(count_crossed(in, group, lane, X, y), mask, sums.behind[part]);
 }
 
 inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {

@@ -35,4 +35,24 @@ struct Batches {
 /// empty). Points that nobody sees are in no group.
 Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip = {});
 
+/// Calls visit(images) with the images of a point's track, in order, for every point whose images
+/// are not those of the point before: points are sorted by them, so few sets come twice.
+template <class Visit>
+void for_each_image_set(const Batches& batches, const Visit& visit) {
+  std::vector<std::uint32_t> previous, set;
+  for (const Batches::Group& group : batches.groups) {
+    const std::uint64_t end = group.first_batch + group.track;
+    bool uniform = true;
+    for (std::uint64_t b = group.first_batch; b < end; ++b) uniform &= batches.uniform[b] >= 0;
+    for (std::uint32_t l = 0; l < (uniform ? 1 : group.lanes); ++l) {
+      set.clear();
+      for (std::uint64_t b = group.first_batch; b < end; ++b)
+        set.push_back(batches.image[8 * b + l]);
+      if (set == previous) continue;
+      visit(set);
+      previous.swap(set);
+    }
+  }
+}
+
 }  // namespace sheaf

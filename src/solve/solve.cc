@@ -57,6 +57,7 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
                    std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
+  if (options.inner_iterations < 0) return usage("inner_iterations is negative");
   if (!(options.tolerance >= 0)) return usage("tolerance is negative or not a number");
   if (!(options.gradient_tolerance >= 0))
     return usage("gradient_tolerance is negative or not a number");
@@ -89,9 +90,10 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
 
-  BundleSystem system(problem, std::move(batches), std::move(columns), options.fixed.points,
-                      options.cheirality != Cheirality::formula, choice.value().plan.kind, kernels,
-                      threads);
+  const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
+                         options.inner_iterations};
+  BundleSystem system(problem, std::move(batches), std::move(columns), rules,
+                      choice.value().plan.kind, kernels, threads);
   if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
   summary.setup_s = clock.seconds();
   SolveOptions resolved = options;

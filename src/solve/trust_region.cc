@@ -17,24 +17,31 @@ constexpr double kLargestDamping = 1e32;
 constexpr double kLoosestForcing = 0.03, kTightestForcing = 0.01;
 /// A gain below this is a step that did not help.
 constexpr double kSmallestGain = 1e-3;
+/// Gain ratios this close to 1 come from a model that was exact.
+constexpr double kExact = 0.02, kCarefulDamping = 1e-4;
 /// A step that changes no block by more than this (relative) is rounding.
 constexpr double kRounding = 1e-14;
 
 /// lambda, and how fast it grows while steps are rejected (Nielsen's rule; Madsen, Nielsen,
-/// Tingleff 2004). A good step divides it by up to 10, the first one by 3: one good step from afar
-/// says little about the model near the optimum.
+/// Tingleff 2004). A good step divides it by up to 10; the first one by 3, as one good step from
+/// afar says little about the model near the optimum; by 100 where the model was exact twice in a
+/// row, but then not below kCarefulDamping: there, ladybug-49 pays for haste with twice the steps.
 struct Damping {
   double lambda;
   double growth = 2;
-  double smallest_factor = 1.0 / 3;
+  bool first = true, was_exact = false;
 
   void shrink(double gain) {
-    lambda *= std::max(smallest_factor, 1 - std::pow(2 * gain - 1, 3));
-    lambda = std::max(lambda, 1e-16);
+    const bool exact = std::abs(gain - 1) < kExact;
+    double least = lambda * (first ? 1.0 / 3 : 0.1);
+    if (exact && was_exact) least = std::max(lambda * 0.01, std::min(least, kCarefulDamping));
+    lambda = std::max({least, lambda * (1 - std::pow(2 * gain - 1, 3)), 1e-16});
     growth = 2;
-    smallest_factor = 0.1;
+    was_exact = exact;
+    first = false;
   }
   void grow() {
+    was_exact = false;
     lambda = std::min(lambda * growth, kLargestDamping);
     growth *= 2;
   }
@@ -204,7 +211,7 @@ class Loop {
 
 double default_damping(std::size_t images) {
   const double scale = std::max(1.0, static_cast<double>(images) / 50);
-  return std::min(1e-2, 5e-5 * scale * scale);
+  return std::min(1e-2, 2e-5 * std::pow(scale, 4));
 }
 
 void minimize(System& system, const SolveOptions& options, const Stopwatch& since_start,

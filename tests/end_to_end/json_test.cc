@@ -151,6 +151,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"solver", "dense"},
                                 {"memory_limit_bytes", 0},
                                 {"initial_damping", 0.01},
+                                {"inner_iterations", 3},
                                 {"simd", "best"}}));
   EXPECT_EQ(s["input"]["path"], "in.txt");
   EXPECT_EQ(s["input"]["cameras"], 16);

@@ -203,11 +203,11 @@ TEST(Chunks, ListOnlyWhatIsAskedFor) {
   expect_chunks_cover(batches, diagonal);
   expect_every_record_once(batches, diagonal);
   EXPECT_TRUE(diagonal.tiles.empty());
-  EXPECT_TRUE(diagonal.pairs.empty());
+  EXPECT_EQ(diagonal.pairs.size(), 0u);
   const Chunks none = cut_into_chunks(batches, 11, ChunkLists::none);
   expect_chunks_cover(batches, none);
-  EXPECT_TRUE(none.diagonal.empty());
-  EXPECT_TRUE(none.pairs.empty());
+  EXPECT_EQ(none.diagonal.size(), 0u);
+  EXPECT_EQ(none.pairs.size(), 0u);
 }
 
 }  // namespace

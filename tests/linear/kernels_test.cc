@@ -86,8 +86,14 @@ class KernelsTest : public ::testing::Test {
       kernels.diagonal(batches_, chunks_, chunk, records, out.diagonal.data());
       kernels.pairs(chunks_, chunk, records, out.tiles.data());
     }
-    const TrialInput trial{&batches_,      cameras_.data(),    trial_cameras_.data(),
-                           points_.data(), out.factors.data(), true};
+    const TrialInput trial{&batches_,
+                           cameras_.data(),
+                           trial_cameras_.data(),
+                           points_.data(),
+                           out.factors.data(),
+                           true,
+                           points_held_ ? 0 : inner_iterations_,
+                           kMeanSquare};
     out.trial.points = out.trial_points.data();
     out.product.allocate(kProductRecord * 9);
     out.product.fill(0);
@@ -106,6 +112,8 @@ class KernelsTest : public ::testing::Test {
   Chunks chunks_;
   Buffer<double> cameras_, trial_cameras_, points_;
   bool points_held_ = false;
+  int inner_iterations_ = 3;
+  static constexpr double kMeanSquare = 1;  ///< px^2: every point has something to gain
 };
 
 void expect_close(const Buffer<double>& a, const Buffer<double>& b, double tolerance,
@@ -154,6 +162,40 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
       EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
     }
   }
+}
+
+TEST_F(KernelsTest, InnerIterationsMatchTheReferenceAndLowerTheCost) {
+  make(false, ChunkLists::none);
+  double previous = std::numeric_limits<double>::infinity();
+  for (int most : {0, 1, 2, 3}) {
+    inner_iterations_ = most;
+    const Outcome expected = run(reference_kernels());
+    if (most < 2)
+      EXPECT_LT(expected.trial.square_sum, previous);
+    else  // the first step leaves little
+      EXPECT_LE(expected.trial.square_sum, previous);
+    previous = expected.trial.square_sum;
+    for (const Kernels* kernels : available_kernels()) {
+      SCOPED_TRACE(std::string(kernels->name) + ", at most " + std::to_string(most));
+      const Outcome got = run(*kernels);
+      EXPECT_NEAR(got.trial.square_sum, previous, 1e-10 * previous);
+      EXPECT_EQ(got.trial.damping_term, run(*kernels).trial.damping_term);
+    }
+  }
+}
+
+TEST_F(KernelsTest, InnerIterationsEndAtEachPointsOwnMinimum) {
+  make(false, ChunkLists::none);
+  inner_iterations_ = 50;
+  const Outcome there = run(reference_kernels());
+  // From there, with the stepped cameras held, nothing is left to gain but by damped steps.
+  points_ = Buffer<double>(there.trial_points.size());
+  std::copy(there.trial_points.begin(), there.trial_points.end(), points_.begin());
+  std::copy(trial_cameras_.begin(), trial_cameras_.end(), cameras_.begin());
+  for (std::size_t i = 0; i < 9; ++i)
+    std::fill_n(&cameras_[kCameraRecord * i + camera_record::kStep], 9, 0.0);
+  const Outcome again = run(reference_kernels());
+  EXPECT_NEAR(again.trial.square_sum, there.trial.square_sum, 1e-4 * there.trial.square_sum);
 }
 
 TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {

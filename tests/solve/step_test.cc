@@ -145,6 +145,7 @@ void expect_textbook_step(const Problem& start, const Fixed& fixed, double dampi
   SolveOptions options;
   options.fixed = fixed;
   options.initial_damping = damping;
+  options.inner_iterations = 0;  // the textbook has none
   options.max_iterations = 1;
   options.gradient_tolerance = 0;
   const Summary s = solve(problem, options);
