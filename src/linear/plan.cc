@@ -63,21 +63,29 @@ double coarse_seconds(const WorkCounts& c) {
                  n * n * n / 3 / kDenseFlopsPerNs + iterations(c) * kCoarseEntryNs * n * n);
 }
 
+/// S's blocks as slices of sums: multiplied into, and 704 bytes of each cleared, added to and
+/// summed, which for many slices outweighs the products.
+constexpr double kSliceTileNs = 200;
+double forming_seconds(const WorkCounts& c) {
+  const int slices = count_slices(linearize_flops(c.batches, c.pairs), c.tiles, c.images);
+  return seconds(kPairNs * static_cast<double>(c.pairs) +
+                 kSliceTileNs * slices * static_cast<double>(c.tiles));
+}
+
 double dense_seconds(const WorkCounts& c) {
   const double n = static_cast<double>(c.columns);
-  return seconds(kPairNs * static_cast<double>(c.pairs) + n * n * n / 3 / kDenseFlopsPerNs);
+  return forming_seconds(c) + seconds(n * n * n / 3 / kDenseFlopsPerNs);
 }
 /// Measured; wide panels run faster than one dense matrix, which leaves the caches. Panels are also
 /// cleared, filled and read twice to substitute.
 constexpr double kSparseFlopsPerNs = 65, kSparseEntryNs = 2.5;
 double sparse_seconds(const WorkCounts& c) {
-  return seconds(kPairNs * static_cast<double>(c.pairs) + c.sparse_flops / kSparseFlopsPerNs +
-                 kSparseEntryNs * static_cast<double>(c.sparse_doubles));
+  return forming_seconds(c) + seconds(c.sparse_flops / kSparseFlopsPerNs +
+                                      kSparseEntryNs * static_cast<double>(c.sparse_doubles));
 }
 double explicit_seconds(const WorkCounts& c) {
   const double blocks = 2 * static_cast<double>(c.tiles) + static_cast<double>(c.images);
-  return coarse_seconds(c) +
-         seconds(kPairNs * static_cast<double>(c.pairs) + (iterations(c) + 4) * kBlockNs * blocks);
+  return forming_seconds(c) + coarse_seconds(c) + seconds((iterations(c) + 4) * kBlockNs * blocks);
 }
 double implicit_seconds(const WorkCounts& c) {
   return coarse_seconds(c) +

@@ -131,7 +131,7 @@ TEST_P(LongStreet, TakesFewIterationsAndTheSameSteps) {
   EXPECT_NEAR(s.final_cost, expected, 2e-3 * expected);
   int iterations = 0;
   for (const Iteration& it : s.iterations) iterations += it.linear_iterations;
-  // 99 and 97 measured; 593 with the diagonal blocks alone.
+  // With the diagonal blocks alone 7 steps of a street of 138 images took 427.
   EXPECT_LE(iterations, 130);
 }
 
