@@ -32,6 +32,8 @@ struct CameraVectors {
   void gather(const ReducedSums& sums, const Columns& columns);
 };
 
+class CoarseSpace;
+
 /// (S + D) x = b, to solve exactly or, by an iterative solver, until the quadratic model's
 /// decrease per step falls below `forcing` of its mean.
 struct CameraSystem {
@@ -40,6 +42,7 @@ struct CameraSystem {
   const double* damping;  ///< D: one for each column
   double forcing = 0.1;
   const std::function<bool()>* cancelled = nullptr;
+  const CoarseSpace* coarse = nullptr;  ///< factored; null: none
 };
 
 struct CameraSolution {

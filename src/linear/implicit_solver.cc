@@ -6,6 +6,7 @@
 #include "linear/block_diagonal.h"
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
+#include "linear/preconditioner.h"
 
 namespace sheaf {
 namespace {
@@ -82,7 +83,7 @@ class ImplicitSolver : public CameraSolver {
 
   CameraSolution solve(const CameraSystem& system, Buffer<double>& x) override {
     if (!blocks_.factor(system.sums.diagonal, system.damping)) return {};
-    return cg_.run(operator_, blocks_, system, x);
+    return cg_.run(operator_, Preconditioner{blocks_, system.coarse}, system, x);
   }
   std::uint64_t bytes() const override { return operator_.bytes() + blocks_.bytes() + cg_.bytes(); }
 

@@ -11,6 +11,7 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "linear/coarse-inl.h"
 #include "linear/eliminate-inl.h"
 #include "linear/products-inl.h"
 #include "linear/schur_product-inl.h"
@@ -34,6 +35,11 @@ void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, dou
   pair_products(chunks, chunk, records, tiles);
 }
 
+void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
+            const CoarseInput& in, double* scratch, double* sums) {
+  coarse_products(batches, chunk, records, in, scratch, sums);
+}
+
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
   trial_chunk(in, chunk, out);
 }
@@ -53,7 +59,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name, fused, &linearize, &diagonal, &pairs, &trial, &product, &square_sum, &count_behind};
+  return {name,    fused,  &linearize, &diagonal,   &pairs,
+          &coarse, &trial, &product,   &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -70,6 +77,10 @@ std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
 
 std::size_t product_scratch_doubles(const Batches& batches) {
   return std::size_t(20 * 8) * batches.longest_track;
+}
+
+std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters) {
+  return (24 + 1) * coarse_scratch_clusters(batches, clusters);
 }
 
 Records records_in(double* scratch, const Chunks& chunks) {
