@@ -4,6 +4,7 @@
 
 #include "sheaf/error.h"
 #include "sheaf/io.h"
+#include "sheaf/loss.h"
 #include "sheaf/options.h"
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"

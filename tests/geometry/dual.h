@@ -63,6 +63,10 @@ Dual<S, N> sqrt(const Dual<S, N>& a) {
   return combine<S, N>(root, [&](int i) { return a.d[i] / (2 * root); });
 }
 template <class S, int N>
+Dual<S, N> log1p(const Dual<S, N>& a) {
+  return combine<S, N>(std::log1p(a.value), [&](int i) { return a.d[i] / (1 + a.value); });
+}
+template <class S, int N>
 Dual<S, N> sin(const Dual<S, N>& a) {
   return combine<S, N>(std::sin(a.value), [&](int i) { return std::cos(a.value) * a.d[i]; });
 }
