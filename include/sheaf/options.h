@@ -6,6 +6,7 @@
 #include <limits>
 #include <stop_token>
 
+#include "sheaf/loss.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -38,6 +39,7 @@ struct SolveOptions {
   double tolerance = 1e-8;  ///< stop when the relative cost decrease stays below this twice
   double gradient_tolerance = 1e-10;  ///< stop when the scaled gradient is at most this x |r|
   double time_limit_s = std::numeric_limits<double>::infinity();  ///< set-up included
+  Loss loss{};                                                    ///< none, or as in `Huber{1.0}`
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
   Fixed fixed{};

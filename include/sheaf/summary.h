@@ -6,11 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "sheaf/loss.h"
+
 namespace sheaf {
 
 /// One trust region step. Index 0 is the start: no trial, accepted.
 struct Iteration {
   int index = 0;
+  int round = 0;          ///< of the loss's scale: index into Summary::rounds
+  double start_cost = 0;  ///< of the state held before the step, with the scale of its round
   double cost = 0;        ///< of the state held after the step
   double trial_cost = 0;  ///< of the state tried; may be infinite or NaN
   bool accepted = true;
@@ -36,15 +40,30 @@ enum class Termination {
 /// "cost_converged", ... : stable, for JSON.
 const char* to_string(Termination termination);
 
-/// What happened. Costs are 1/2 sum |r|^2 in px^2.
-struct Summary {
-  double initial_cost = 0;
+/// Steps that were made with one scale of the loss. Within a round costs only fall; between two
+/// they mean different things.
+struct LossRound {
+  double scale_px = 0;      ///< 0 without a loss
+  double sigma_px = 0;      ///< that an automatic scale was set for; 0: the scale was given
+  double initial_cost = 0;  ///< with this scale, of the state that the round starts from
   double final_cost = 0;
-  double initial_rms_px = 0;  ///< per observation
+  int steps = 0;  ///< tried, rejected ones included
+};
+
+/// What happened. Costs are 1/2 sum rho(|r|^2) in px^2; without a loss rho(s) = s.
+struct Summary {
+  double initial_cost = 0;        ///< with the first round's scale
+  double final_cost = 0;          ///< with the last round's
+  double initial_plain_cost = 0;  ///< 1/2 sum |r|^2, whatever the loss
+  double final_plain_cost = 0;
+  double initial_rms_px = 0;  ///< per observation, of the plain residuals
   double final_rms_px = 0;
   Termination termination = Termination::no_usable_step;
   std::string words;  ///< the reason for stopping, as a sentence
   std::vector<Iteration> iterations;
+  LossKind loss = LossKind::none;
+  std::vector<LossRound> rounds;  ///< without a loss one
+  double final_sigma_px = 0;      ///< estimated at the end, for an automatic scale
 
   std::string solver;         ///< "dense", ...
   std::string solver_reason;  ///< one line: why this one

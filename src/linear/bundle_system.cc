@@ -67,7 +67,8 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       break;
     case SolverKind::implicit_cg:
       solver_ = make_implicit_solver(
-          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_}, kernels, threads);
+          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_}, kernels,
+          threads);
       break;
   }
 }
@@ -115,8 +116,11 @@ Step BundleSystem::propose(const StepRequest& request) {
   const std::size_t slices = chunks_.slices.size() - 1;
   const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
-  const EliminateInput in{&batches_,      &chunks_,        cameras_.data(),
-                          points_.data(), request.damping, rules_.held};
+  loss_ = request.loss;
+  const std::size_t weights = loss_.kind == LossKind::none ? 0 : 8 * batches_.num_batches();
+  if (weights_.size() != weights) weights_.allocate(weights);
+  const EliminateInput in{&batches_,   &chunks_, cameras_.data(), points_.data(), request.damping,
+                          rules_.held, loss_};
   if (coarse_) coarse_->place(cameras_.data());
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
@@ -128,7 +132,7 @@ Step BundleSystem::propose(const StepRequest& request) {
     std::fill_n(tiles, tile_doubles, 0.0);
     std::fill_n(diagonal, diagonal_doubles, 0.0);
     if (coarse_) coarse_->clear(s);
-    outputs[s] = {factors_.data(), 0, 0, 0};
+    outputs[s] = {factors_.data(), 0, 0, 0, 0, weights_.data()};
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
       kernels_.linearize(in, chunks_.chunks[c], records, outputs[s]);
       kernels_.diagonal(batches_, chunks_, chunks_.chunks[c], records, diagonal);
@@ -144,15 +148,17 @@ Step BundleSystem::propose(const StepRequest& request) {
 Step BundleSystem::collect_step(const StepRequest& request,
                                 const std::vector<EliminateOutput>& outputs) {
   Step step;
-  double square_sum = 0, gradient2 = 0;
+  double square_sum = 0, loss_sum = 0, gradient2 = 0;
   point_decrease_ = 0;
   for (const EliminateOutput& out : outputs) {
     square_sum += out.square_sum;
+    loss_sum += out.loss_sum;
     point_decrease_ += out.point_decrease;
     gradient2 = std::max(gradient2, out.gradient_max2);
   }
-  step.cost = square_sum / 2;
-  mean_square_ = square_sum / static_cast<double>(batches_.observations);
+  step.plain_cost = square_sum / 2;
+  step.cost = cost_of(square_sum, loss_sum);
+  mean_square_ = 2 * step.cost / static_cast<double>(batches_.observations);
   // w is whitened by V (1 + damping): undo the damping's part.
   step.gradient_max = std::sqrt(gradient2 * (1 + request.damping));
   vectors_.gather({&chunks_, tiles_.data(), diagonal_.data()}, columns_);
@@ -229,26 +235,35 @@ Trial BundleSystem::trial() {
                       factors_.data(),
                       rules_.watch_behind,
                       rules_.held ? 0 : rules_.inner_iterations,
-                      mean_square_};
+                      mean_square_,
+                      loss_,
+                      weights_.data()};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
       kernels_.trial(in, chunks_.chunks[c], outputs[s]);
   });
-  double decrease = point_decrease_, square_sum = 0, step2 = 0;
+  double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
   for (const TrialOutput& o : outputs) {
     square_sum += o.square_sum;
+    loss_sum += o.loss_sum;
     decrease += o.damping_term;
     step2 = std::max(step2, o.step2_max);
     out.newly_behind += o.newly_behind;
   }
   for (std::int32_t c = 0; c < columns_.count; ++c)
     decrease += camera_step_[c] * (vectors_.rhs[c] + damping_[c] * camera_step_[c]);
-  out.cost = square_sum / 2;
+  out.plain_cost = square_sum / 2;
+  out.cost = cost_of(square_sum, loss_sum);
   out.predicted_decrease = decrease / 2;
   out.step_norm = std::max(out.step_norm, std::sqrt(step2));
   return out;
+}
+
+/// A loss may be finite where the residual is not: such a state has no finite cost either.
+double BundleSystem::cost_of(double square_sum, double loss_sum) const {
+  return (loss_.kind == LossKind::none || !std::isfinite(square_sum) ? square_sum : loss_sum) / 2;
 }
 
 void BundleSystem::accept() {
@@ -271,6 +286,34 @@ void BundleSystem::store(Problem& problem) const {
     }
 }
 
+double BundleSystem::residual_scale(double quantile) {
+  QuantileSearch search(quantile, 2 * batches_.observations);
+  while (!search.done()) search.narrow(count_residuals(search));
+  return search.value();
+}
+
+/// One pass over the residuals. Counts are whole numbers: the threads' shares add up to the same
+/// in any order.
+DigitCounts BundleSystem::count_residuals(const QuantileSearch& search) {
+  std::vector<DigitCounts> counts(static_cast<std::size_t>(threads_.count()));
+  threads_.for_each(chunks_.slices.size() - 1, [&](std::size_t s) {
+    Buffer<double>& scratch = scratch_[threads_.worker()];
+    if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
+    DigitCounts& mine = counts[threads_.worker()];
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
+      const Chunk& chunk = chunks_.chunks[c];
+      kernels_.residuals(batches_, cameras_.data(), points_.data(), chunk, scratch.data());
+      for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+        const Batches::Group& group = batches_.groups[g];
+        const double* of = scratch.data() + 16 * (group.first_batch - chunk.first_batch);
+        for (std::uint32_t row = 0; row < 2 * group.track; ++row)
+          for (std::uint32_t l = 0; l < group.lanes; ++l) search.count(of[8 * row + l], mine);
+      }
+    }
+  });
+  return sum_of(counts);
+}
+
 std::uint64_t BundleSystem::count_behind() {
   std::uint64_t count = 0;
   for (const Chunk& chunk : chunks_.chunks)
@@ -286,7 +329,7 @@ std::uint64_t BundleSystem::bytes() const {
          size(chunks_.diagonal_runs) + size(chunks_.tiles);
   sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
          factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
-  sum += scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
+  sum += weights_.bytes() + scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
   return sum + solver_->bytes() + (coarse_ ? coarse_->bytes() : 0);
 }
 

@@ -12,6 +12,7 @@
 #include "linear/columns.h"
 #include "linear/kernels.h"
 #include "linear/plan.h"
+#include "linear/quantile.h"
 #include "linear/system.h"
 #include "platform/buffer.h"
 #include "platform/parallel.h"
@@ -39,6 +40,7 @@ class BundleSystem : public System {
   Step propose(const StepRequest& request) override;
   Trial trial() override;
   void accept() override;
+  double residual_scale(double quantile) override;
   void store(Problem& problem) const override;
 
   /// Observations behind their camera at the held state.
@@ -53,6 +55,8 @@ class BundleSystem : public System {
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();
+  DigitCounts count_residuals(const QuantileSearch& search);
+  double cost_of(double square_sum, double loss_sum) const;
 
   const PointRules rules_;
   const Kernels& kernels_;
@@ -75,8 +79,10 @@ class BundleSystem : public System {
   Buffer<double> damping_, camera_step_;
   std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   std::unique_ptr<CameraSolver> solver_;
-  double mean_square_ = 0;  ///< of a residual at the held state
+  double mean_square_ = 0;  ///< 2 cost / observations at the held state
   double point_decrease_ = 0;
+  ScaledLoss loss_;         ///< of the last proposal
+  Buffer<double> weights_;  ///< rho' of the held state, 8 per batch; empty without a loss
 };
 
 }  // namespace sheaf

@@ -81,6 +81,7 @@ struct HeldState {
   Buffer<double>* cameras;
   const Buffer<double>* points;
   const Buffer<double>* factors;
+  const Buffer<double>* weights;  ///< of the loss; empty: none
 };
 
 /// Conjugate gradients with S never formed: products recompute the Jacobians from the state.

@@ -13,6 +13,7 @@
 
 #include "linear/kernels.h"
 #include "residual/bal_lanes-inl.h"
+#include "residual/loss_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -127,12 +128,25 @@ HWY_INLINE V damp(V lambda, V v) {
 }
 
 struct EliminateSums {
-  V square[kParts], decrease[kParts], gradient2[kParts];
+  V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
 
+/// The rows of a loss: sqrt(rho') times those of the residual.
+HWY_INLINE Rho apply_loss(const ScaledLoss& loss, LaneJacobian& j) {
+  const Rho rho = rho_lanes(LossLanes(loss), fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
+  const V root = hn::Sqrt(rho.weight);
+  for (int r = 0; r < 2; ++r) {
+    j.r[r] = hn::Mul(j.r[r], root);
+    for (V& x : j.camera[r]) x = hn::Mul(x, root);
+    for (V& x : j.point[r]) x = hn::Mul(x, root);
+  }
+  return rho;
+}
+
+template <bool Robust>
 HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& group, std::size_t g,
-                               int part, double* jacobians, double* T, double* C, double* factors,
-                               EliminateSums& sums) {
+                               int part, double* jacobians, double* T, double* C,
+                               const EliminateOutput& to, EliminateSums& sums) {
   const Batches& batches = *in.batches;
   const int lane = part * kLanes;
   const double* X = in.points + kPointGroup * g + lane;
@@ -141,18 +155,24 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   const V* scale = group.lanes < 8 ? &mask : nullptr;
   PointSums p;
   p.clear();
-  V square = sums.square[part];
+  V square = sums.square[part], robust = sums.loss[part];
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     V c[16];
     load_cameras<2>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
     const double* z = &batches.xy[16 * b + lane];
-    const LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), scale);
+    LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), scale);
     square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
+    if constexpr (Robust) {
+      const Rho rho = apply_loss(in.loss, j);
+      robust = hn::Add(robust, rho.value);
+      store(rho.weight, to.weights + 8 * b + lane);
+    }
     p.add(j);
     save(j, jacobians + kJacobianFields * kLanes * o);
   }
   sums.square[part] = square;
+  sums.loss[part] = robust;
 
   const V lambda = set(in.damping);
   V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
@@ -167,7 +187,7 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
   sums.decrease[part] = hn::Add(sums.decrease[part], w2);
   sums.gradient2[part] = hn::Max(sums.gradient2[part], w2);
-  double* out = factors + kFactorGroup * g + lane;
+  double* out = to.factors + kFactorGroup * g + lane;
   const V all[12] = {f.i00, f.l10, f.l20, f.i11, f.l21, f.i22, w[0], w[1], w[2], D0, D1, D2};
   for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
 
@@ -190,18 +210,21 @@ HWY_INLINE double max_parts(const V* parts) {
   return most;
 }
 
+template <bool Robust>
 inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, const Records& records,
                             EliminateOutput& out) {
   EliminateSums sums;
-  for (int p = 0; p < kParts; ++p) sums.square[p] = sums.decrease[p] = sums.gradient2[p] = zero();
+  for (int p = 0; p < kParts; ++p)
+    sums.square[p] = sums.loss[p] = sums.decrease[p] = sums.gradient2[p] = zero();
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     const Batches::Group group = in.batches->groups[g];
     const std::size_t record = 8 * (group.first_batch - chunk.first_batch);
     for (int p = 0; p < kParts; ++p)
-      eliminate_part(in, group, g, p, records.jacobians, records.T + kTRecord * record,
-                     records.C + kCRecord * record, out.factors, sums);
+      eliminate_part<Robust>(in, group, g, p, records.jacobians, records.T + kTRecord * record,
+                             records.C + kCRecord * record, out, sums);
   }
   out.square_sum += sum_parts(sums.square);
+  if (Robust) out.loss_sum += sum_parts(sums.loss);
   out.point_decrease += sum_parts(sums.decrease);
   const double gradient2 = max_parts(sums.gradient2);
   out.gradient_max2 = gradient2 > out.gradient_max2 ? gradient2 : out.gradient_max2;

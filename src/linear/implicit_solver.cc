@@ -24,7 +24,7 @@ class ImplicitOperator : public ImageOperator {
   void apply(const double* x, double* y) override {
     for (std::size_t i = 0; i < images_; ++i) write_step(x + kImageVector * i, i);
     const ProductInput in{state_.batches, state_.cameras->data(), state_.points->data(),
-                          state_.factors->data()};
+                          state_.factors->data(), state_.weights->data()};
     const std::size_t stride = kProductRecord * images_;
     threads_.for_each(slices_, [&](std::size_t s) {
       Buffer<double>& saved = saved_[threads_.worker()];

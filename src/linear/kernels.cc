@@ -21,9 +21,13 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
+// Each is compiled twice, so that a problem without a loss pays nothing for those that have one.
 void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
                EliminateOutput& out) {
-  linearize_chunk(in, chunk, records, out);
+  if (in.loss.kind == LossKind::none)
+    linearize_chunk<false>(in, chunk, records, out);
+  else
+    linearize_chunk<true>(in, chunk, records, out);
 }
 
 void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
@@ -41,11 +45,22 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  trial_chunk(in, chunk, out);
+  if (in.loss.kind == LossKind::none)
+    trial_chunk<false>(in, chunk, out);
+  else
+    trial_chunk<true>(in, chunk, out);
 }
 
 void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {
-  product_chunk(in, chunk, saved, y);
+  if (in.weights == nullptr)
+    product_chunk<false>(in, chunk, saved, y);
+  else
+    product_chunk<true>(in, chunk, saved, y);
+}
+
+void residuals(const Batches& batches, const double* cameras, const double* points,
+               const Chunk& chunk, double* out) {
+  residuals_chunk(batches, cameras, points, chunk, out);
 }
 
 double square_sum(const Batches& batches, const double* cameras, const double* points,
@@ -59,8 +74,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name,    fused,  &linearize, &diagonal,   &pairs,
-          &coarse, &trial, &product,   &square_sum, &count_behind};
+  return {name,   fused,    &linearize, &diagonal,   &pairs,       &coarse,
+          &trial, &product, &residuals, &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE

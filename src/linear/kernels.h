@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "geometry/loss.h"
 #include "linear/chunks.h"
 #include "residual/batches.h"
 
@@ -42,15 +43,18 @@ struct EliminateInput {
   const double* points;   ///< kPointGroup per group
   double damping;         ///< lambda: D = lambda diag(V), clamped as below
   bool points_held;
+  ScaledLoss loss{};
 };
 /// diag(J^T J) is clamped to this range before it is scaled by lambda.
 constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
 
 struct EliminateOutput {
-  double* factors;        ///< kFactorGroup per group
-  double square_sum;      ///< sum |r|^2
-  double point_decrease;  ///< sum |w|^2
-  double gradient_max2;   ///< largest |w|^2 of a point
+  double* factors;            ///< kFactorGroup per group
+  double square_sum;          ///< sum |r|^2
+  double point_decrease;      ///< sum |w|^2
+  double gradient_max2;       ///< largest |w|^2 of a point
+  double loss_sum = 0;        ///< sum rho(|r|^2); not summed without a loss
+  double* weights = nullptr;  ///< rho'(|r|^2), 8 per batch; not written without a loss
 };
 
 struct TrialInput {
@@ -61,15 +65,18 @@ struct TrialInput {
   const double* factors;
   bool count_newly_behind;
   int inner_iterations;  ///< at most, of each point
-  double mean_square;    ///< sum |r|^2 at the held state by observation
+  double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
+  ScaledLoss loss{};
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
 };
 
 /// Once the cameras have stepped and the points followed by back-substitution, each point takes
 /// Gauss-Newton steps by itself, its cameras held: cheap, and what the linear model got wrong about
 /// the point is mended before the cost is judged ("embedded point iterations": Jeong, Nister,
 /// Steedly, Szeliski, Kweon, Pushing the Envelope of Modern Methods for Bundle Adjustment, 2012).
-/// A step that does not lower the point's own cost is not taken. Decreases are of sum |r|^2, as the
-/// point's own linear model predicts them, in mean_square by observation of the point.
+/// A step that does not lower the point's own cost is not taken. Decreases are of sum |r|^2 (or rho
+/// of it), as the point's own linear model predicts them, in mean_square by observation of the
+/// point.
 namespace inner_iterations {
 constexpr double kWorthOne = 1e-4;  ///< smaller decreases are left to the next iteration
 constexpr double kWorthMore = 0.1;  ///< after a larger one, another step is looked at
@@ -84,6 +91,7 @@ struct TrialOutput {
   double damping_term;         ///< sum d^T D d over points
   double step2_max;            ///< largest |d|^2 / |X|^2 of a point
   std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
+  double loss_sum = 0;         ///< sum rho(|r|^2) there; not summed without a loss
 };
 
 /// x is the step in the camera records.
@@ -92,6 +100,7 @@ struct ProductInput {
   const double* cameras;  ///< held state, with x as the step
   const double* points;
   const double* factors;
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
 };
 /// Per image: rho (3), phi (3), then sums of s, s n and s n^2 (s = p . e), 7 unused:
 ///   y_f = s0 + k1 s1 + k2 s2, y_k1 = f s1, y_k2 = f s2.
@@ -149,6 +158,9 @@ struct Kernels {
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
   /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, kProductRecord doubles per image.
   void (*product)(const ProductInput&, const Chunk&, double* saved, double* y);
+  /// |r_x| of a batch's eight lanes, then |r_y|, 16 per batch of the chunk.
+  void (*residuals)(const Batches&, const double* cameras, const double* points, const Chunk&,
+                    double* out);
   /// Sum |r|^2 of the chunk.
   double (*square_sum)(const Batches&, const double* cameras, const double* points, const Chunk&);
   /// Observations of the chunk whose point lies behind its camera (P.z > 0).

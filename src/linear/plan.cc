@@ -181,6 +181,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) 
   const auto slices = static_cast<std::uint64_t>(
       count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
   std::uint64_t sum = c.batches * (32 + 4 + 128) + c.groups * (16 + 32);
+  if (c.weighted) sum += c.batches * 64;
   sum += c.groups * 8 * (2 * kPointGroup + kFactorGroup);
   sum += c.images * (8 * 2 * kCameraRecord + 2 * 56 + 2 * 24 + 36 + 4) + 5 * 8 * c.columns;
   sum += slices * 8 * (kTileDoubles * tiles + kDiagonalDoubles * c.images);

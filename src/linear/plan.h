@@ -28,6 +28,7 @@ struct WorkCounts {
   std::uint64_t clusters = 0, cluster_pairs = 0;
   std::uint32_t longest_track = 0;
   bool images_couple = true;  ///< some free point or shared lens couples images
+  bool weighted = false;      ///< a loss leaves a weight for each observation
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;

@@ -37,6 +37,19 @@ Vector3<double> point_of(const double* points, std::size_t group, std::uint32_t 
 struct Row {
   std::array<double, 2> r;
   BalJacobian<double> j;
+
+  double square() const { return r[0] * r[0] + r[1] * r[1]; }
+  /// Times sqrt(rho'); returns rho of what it was.
+  LossValue<double> apply(const ScaledLoss& loss) {
+    const LossValue<double> rho = evaluate_loss(loss, square());
+    scale(std::sqrt(rho.first));
+    return rho;
+  }
+  void scale(double by) {
+    for (double& x : r) x *= by;
+    for (double& x : j.camera) x *= by;
+    for (double& x : j.point) x *= by;
+  }
 };
 
 Row row_of(const Batches& batches, const double* cameras, const Vector3<double>& X,
@@ -119,8 +132,14 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   std::array<double, 9> A{};
   Vector3<double> gradient{}, D;
   for (std::uint32_t o = 0; o < group.track; ++o) {
-    const Row row = row_of(*in.batches, in.cameras, X, group.first_batch + o, lane);
-    out.square_sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
+    const std::uint64_t b = group.first_batch + o;
+    Row row = row_of(*in.batches, in.cameras, X, b, lane);
+    out.square_sum += row.square();
+    if (in.loss.kind != LossKind::none) {
+      const LossValue<double> rho = row.apply(in.loss);
+      out.loss_sum += rho.value;
+      out.weights[8 * b + lane] = rho.first;
+    }
     for (int e = 0; e < 2; ++e)
       for (int i = 0; i < 3; ++i) {
         gradient[i] -= row.j.point[3 * e + i] * row.r[e];
@@ -139,9 +158,11 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   out.gradient_max2 = std::max(out.gradient_max2, w2);
   store_factor(f, w, D, out.factors + kFactorGroup * g + lane);
   for (std::uint32_t o = 0; o < group.track; ++o) {
-    const std::uint64_t record = 8 * (group.first_batch + o - chunk.first_batch) + lane;
-    write_record(row_of(*in.batches, in.cameras, X, group.first_batch + o, lane), f, w,
-                 T + kTRecord * record, C + kCRecord * record);
+    const std::uint64_t b = group.first_batch + o;
+    const std::uint64_t record = 8 * (b - chunk.first_batch) + lane;
+    Row row = row_of(*in.batches, in.cameras, X, b, lane);
+    if (in.loss.kind != LossKind::none) row.scale(std::sqrt(out.weights[8 * b + lane]));
+    write_record(row, f, w, T + kTRecord * record, C + kCRecord * record);
   }
 }
 
@@ -238,6 +259,15 @@ std::array<double, 2> camera_motion(const Row& row, const double* record) {
   return e;
 }
 
+double weight_of(const double* weights, std::uint64_t batch, std::uint32_t lane) {
+  return weights == nullptr ? 1 : weights[8 * batch + lane];
+}
+
+/// s += Jp^T w e.
+void add_to_point(const Row& row, double w, const std::array<double, 2>& e, Vector3<double>& s) {
+  for (int i = 0; i < 3; ++i) s[i] += w * (row.j.point[i] * e[0] + row.j.point[3 + i] * e[1]);
+}
+
 Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {
   const auto at = [&](int i) { return factor[8 * i]; };
   const double u0 = s[0] * at(0);
@@ -252,7 +282,7 @@ Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) 
 }
 
 struct PointCost {
-  double square = 0;
+  double square = 0, cost = 0;
   Matrix3<double> V{};
   Vector3<double> g{};
 };
@@ -261,10 +291,11 @@ PointCost cost_of(const TrialInput& in, const Batches::Group& group, const Vecto
                   std::uint32_t lane) {
   PointCost out;
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-    const Row row = row_of(*in.batches, in.trial_cameras, X, b, lane);
+    Row row = row_of(*in.batches, in.trial_cameras, X, b, lane);
+    out.square += row.square();
+    out.cost += row.apply(in.loss).value;
     for (int r = 0; r < 2; ++r) {
       const double* J = &row.j.point[3 * r];
-      out.square += row.r[r] * row.r[r];
       for (int i = 0; i < 3; ++i) {
         out.g[i] -= J[i] * row.r[r];
         for (int k = 0; k < 3; ++k) out.V[3 * i + k] += J[i] * J[k];
@@ -274,9 +305,9 @@ PointCost cost_of(const TrialInput& in, const Batches::Group& group, const Vecto
   return out;
 }
 
-/// Inner iterations (kernels.h) of one point from X; returns sum |r|^2 where it ends.
-double refine_point(const TrialInput& in, const Batches::Group& group, std::uint32_t lane,
-                    const double* factor, Vector3<double>& X) {
+/// Inner iterations (kernels.h) of one point from X; returns the cost where it ends.
+PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::uint32_t lane,
+                       const double* factor, Vector3<double>& X) {
   PointCost best = cost_of(in, group, X, lane);
   const double mean = in.mean_square * group.track;
   for (int step = 0; step < in.inner_iterations; ++step) {
@@ -289,11 +320,11 @@ double refine_point(const TrialInput& in, const Batches::Group& group, std::uint
     const Vector3<double> d = f.backward(w);
     const Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
     const PointCost there = cost_of(in, group, Y, lane);
-    if (!(there.square < best.square)) break;
+    if (!(there.cost < best.cost)) break;
     X = Y, best = there;
     if (!(decrease > inner_iterations::kWorthMore * mean)) break;
   }
-  return best.square;
+  return best;
 }
 
 double depth(const double* cameras, std::uint32_t image, const Vector3<double>& X) {
@@ -340,12 +371,12 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
     const std::uint64_t b = group.first_batch + o;
     const Row row = row_of(batches, in.cameras, X, b, lane);
     const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
-    for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
+    add_to_point(row, weight_of(in.weights, b, lane), e, s);
   }
   const double* factor = in.factors + kFactorGroup * g + lane;
   const Vector3<double> d = real ? back_substitute(factor, s) : Vector3<double>{};
   Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
-  const double square = real ? refine_point(in, group, lane, factor, Y) : 0;
+  const PointCost cost = real ? refine_point(in, group, lane, factor, Y) : PointCost();
   double d2 = 0, x2 = 1e-300;
   for (int i = 0; i < 3; ++i) {
     out.points[kPointGroup * g + 8 * i + lane] = Y[i];
@@ -354,7 +385,8 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
   }
   if (!real) return;
   out.step2_max = std::max(out.step2_max, d2 / x2);
-  out.square_sum += square;
+  out.square_sum += cost.square;
+  if (in.loss.kind != LossKind::none) out.loss_sum += cost.cost;
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     const std::uint32_t image = batches.image[8 * b + lane];
@@ -379,7 +411,7 @@ void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, do
     const std::uint64_t b = group.first_batch + o;
     const Row row = row_of(batches, in.cameras, X, b, lane);
     const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
-    for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
+    add_to_point(row, weight_of(in.weights, b, lane), e, s);
   }
   // back_substitute gives L^-T (w - L^-1 s): taken from that of s = 0, (V + D)^-1 s is left.
   const Vector3<double> with = back_substitute(factor, s), without = back_substitute(factor, {});
@@ -391,9 +423,10 @@ void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, do
     auto e = camera_motion(row, record);
     for (int r = 0; r < 2; ++r)
       for (int i = 0; i < 3; ++i) e[r] -= row.j.point[3 * r + i] * (without[i] - with[i]);
+    const double w = weight_of(in.weights, b, lane);
     std::array<double, 9> v{};
     for (int r = 0; r < 2; ++r)
-      for (int k = 0; k < 9; ++k) v[k] += row.j.camera[9 * r + k] * e[r];
+      for (int k = 0; k < 9; ++k) v[k] += w * row.j.camera[9 * r + k] * e[r];
     v[7] /= record[12], v[8] /= record[12];  // to the sums s n, s n^2, and s from y_f
     v[6] -= record[13] * v[7] + record[14] * v[8];
     for (int k = 0; k < 9; ++k) y[kProductRecord * image + k] += v[k];
@@ -405,6 +438,18 @@ void product(const ProductInput& in, const Chunk& chunk, double*, double* y) {
     for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l) product_point(in, g, l, y);
 }
 
+void residuals(const Batches& batches, const double* cameras, const double* points,
+               const Chunk& chunk, double* out) {
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < 8; ++l)
+      for (std::uint32_t o = 0; o < batches.groups[g].track; ++o) {
+        const std::uint64_t b = batches.groups[g].first_batch + o;
+        const Row row = row_of(batches, cameras, point_of(points, g, l), b, l);
+        for (int e = 0; e < 2; ++e)
+          out[16 * (b - chunk.first_batch) + 8 * e + l] = std::abs(row.r[e]);
+      }
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   double sum = 0;
@@ -413,7 +458,7 @@ double square_sum(const Batches& batches, const double* cameras, const double* p
       for (std::uint32_t o = 0; o < batches.groups[g].track; ++o) {
         const Row row =
             row_of(batches, cameras, point_of(points, g, l), batches.groups[g].first_batch + o, l);
-        sum += row.r[0] * row.r[0] + row.r[1] * row.r[1];
+        sum += row.square();
       }
   return sum;
 }
@@ -432,8 +477,9 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false,  &linearize, &diagonal,   &pairs,
-                               &coarse,     &trial, &product,   &square_sum, &count_behind};
+  static const Kernels kernels{"reference", false,       &linearize,   &diagonal,
+                               &pairs,      &coarse,     &trial,       &product,
+                               &residuals,  &square_sum, &count_behind};
   return kernels;
 }
 

@@ -25,21 +25,23 @@ HWY_INLINE void save_sweep(const V* c, const Seen& s, V fd, V dd, V e0, V e1, do
   for (int i = 0; i < 9; ++i) store(c[i], to + (11 + i) * kLanes);
 }
 
-/// e = Jc x of one observation per lane (also saved), and s += Jp^T e.
-HWY_INLINE void first_sweep(const V* c, V X0, V X1, V X2, const V* mask, double* saved, V* s) {
+/// e = w Jc x of one observation per lane (also saved), and s += Jp^T e; weight: nullptr for w = 1
+/// in all lanes.
+HWY_INLINE void first_sweep(const V* c, V X0, V X1, V X2, const V* weight, double* saved, V* s) {
   const Seen seen = see(c, X0, X1, X2);
   const V fd = hn::Mul(c[12], distortion(c, seen.n));
   const V dd = distortion_slope(c, seen.n);
   V e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
-  if (mask != nullptr) e0 = hn::Mul(e0, *mask), e1 = hn::Mul(e1, *mask);
+  if (weight != nullptr) e0 = hn::Mul(e0, *weight), e1 = hn::Mul(e1, *weight);
   save_sweep(c, seen, fd, dd, e0, e1, saved);
   add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
-/// v = Jc^T (e - Jp u), in the order of the product's record: rho (3), phi (3), then the sums of
+/// v = Jc^T (e - w Jp u), in the order of the product's record: rho (3), phi (3), then the sums of
 /// s, s n and s n^2 with s = p . e that make up the intrinsics.
-HWY_INLINE void second_sweep(const double* from, const V* u, V* v) {
+template <bool Robust>
+HWY_INLINE void second_sweep(const double* from, const double* weights, const V* u, V* v) {
   V f[kSweepFields];
   for (int i = 0; i < kSweepFields; ++i) f[i] = load(from + i * kLanes);
   const V P0 = f[0], P1 = f[1], P2 = f[2], iz = f[3], x = f[4], y = f[5], n = f[6], fd = f[7],
@@ -48,7 +50,8 @@ HWY_INLINE void second_sweep(const double* from, const V* u, V* v) {
   const V m0 = fma(R[0], u[0], fma(R[1], u[1], hn::Mul(R[2], u[2])));
   const V m1 = fma(R[3], u[0], fma(R[4], u[1], hn::Mul(R[5], u[2])));
   const V m2 = fma(R[6], u[0], fma(R[7], u[1], hn::Mul(R[8], u[2])));
-  const V dx = hn::Mul(iz, fma(x, m2, m0)), dy = hn::Mul(iz, fma(y, m2, m1));
+  const V w = Robust ? hn::Mul(iz, load(weights)) : iz;
+  const V dx = hn::Mul(w, fma(x, m2, m0)), dy = hn::Mul(w, fma(y, m2, m1));
   const V along = hn::Mul(dd, fma(x, dx, hn::Mul(y, dy)));
   const V e0 = hn::Sub(f[9], fma(fd, dx, hn::Mul(along, x)));
   const V e1 = hn::Sub(f[10], fma(fd, dy, hn::Mul(along, y)));
@@ -89,6 +92,7 @@ HWY_INLINE void scatter(const double* rows, const double* ninth, const std::uint
   }
 }
 
+template <bool Robust>
 HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& group, std::size_t g,
                               double* saved, double* sums) {
   const Batches& batches = *in.batches;
@@ -104,7 +108,9 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
       const std::uint64_t b = group.first_batch + o;
       V c[24];
       load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-      first_sweep(c, X0, X1, X2, group.lanes < 8 ? &mask : nullptr,
+      V weight = mask;
+      if constexpr (Robust) weight = hn::Mul(mask, load(in.weights + 8 * b + lane));
+      first_sweep(c, X0, X1, X2, Robust || group.lanes < 8 ? &weight : nullptr,
                   saved + kPart * (kParts * o + part), s);
     }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
@@ -114,7 +120,8 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
     alignas(64) double rows[64], ninth[8];
     for (int part = 0; part < kParts; ++part) {
       V v[9];
-      second_sweep(saved + kPart * (kParts * o + part), u[part], v);
+      const double* weights = Robust ? in.weights + 8 * b + part * kLanes : nullptr;
+      second_sweep<Robust>(saved + kPart * (kParts * o + part), weights, u[part], v);
       store_records(v, rows + 8 * part * kLanes, 8);
       store(v[8], ninth + part * kLanes);
     }
@@ -122,9 +129,10 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
   }
 }
 
+template <bool Robust>
 inline void product_chunk(const ProductInput& in, const Chunk& chunk, double* saved, double* sums) {
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
-    product_group(in, in.batches->groups[g], g, saved, sums);
+    product_group<Robust>(in, in.batches->groups[g], g, saved, sums);
 }
 
 }  // namespace HWY_NAMESPACE

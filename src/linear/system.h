@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "geometry/loss.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -12,6 +13,7 @@ namespace sheaf {
 struct StepRequest {
   double damping = 0;    ///< lambda: J^T J + lambda diag(J^T J)
   double forcing = 0.1;  ///< how exactly an iterative solver solves (CameraSystem::forcing)
+  ScaledLoss loss{};     ///< of the held state's cost, of the step and of its trial
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
 };
 
@@ -19,16 +21,18 @@ struct StepRequest {
 struct Step {
   bool solved =
       false;        ///< false: the camera system was not positive definite, not finite or cancelled
-  double cost = 0;  ///< 1/2 sum |r|^2 at the held state, px^2
+  double cost = 0;  ///< 1/2 sum rho(|r|^2) at the held state, px^2
+  double plain_cost = 0;    ///< 1/2 sum |r|^2 there
   double gradient_max = 0;  ///< px: largest |J_i^T r| / |J_i| over the free columns
   int linear_iterations = 0;
 };
 
 /// The state that the step leads to.
 struct Trial {
-  double cost = 0;                 ///< 1/2 sum |r|^2 there; not finite where the formula is not
-  double predicted_decrease = 0;   ///< of the cost, by the linear model
-  double step_norm = 0;            ///< largest relative change of any one block
+  double cost = 0;                ///< 1/2 sum rho(|r|^2) there; not finite where the formula is not
+  double plain_cost = 0;          ///< 1/2 sum |r|^2 there
+  double predicted_decrease = 0;  ///< of the cost, by the linear model
+  double step_norm = 0;           ///< largest relative change of any one block
   std::uint64_t newly_behind = 0;  ///< observations that went behind their camera (if watched)
 };
 
@@ -49,6 +53,10 @@ class System {
 
   /// The stepped state becomes the held one.
   virtual void accept() = 0;
+
+  /// The given quantile of |r_x| and |r_y| together over all observations at the held state, px:
+  /// the smallest of these values that no less than this fraction of them reaches down to.
+  virtual double residual_scale(double quantile) = 0;
 
   /// Writes the held state into the problem; what is fixed is not touched.
   virtual void store(Problem& problem) const = 0;

@@ -39,17 +39,21 @@ HWY_INLINE void add_to_point(const V* c, const Seen& seen, V fd, V dd, V e0, V e
   for (int i = 0; i < 3; ++i) s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
 }
 
-/// s += Jp^T Jc dc of one observation per lane.
-HWY_INLINE void add_coupled(const V* c, const Seen& seen, V* s) {
+/// s += Jp^T w Jc dc of one observation per lane; weights: nullptr for w = 1.
+HWY_INLINE void add_coupled(const V* c, const Seen& seen, const double* weights, V* s) {
   const V fd = hn::Mul(c[12], distortion(c, seen.n));
   const V dd = distortion_slope(c, seen.n);
   V e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
+  if (weights != nullptr) {
+    const V w = load(weights);
+    e0 = hn::Mul(e0, w), e1 = hn::Mul(e1, w);
+  }
   add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
 struct TrialSums {
-  V square[kParts], damping[kParts], step2[kParts], behind[kParts];
+  V square[kParts], loss[kParts], damping[kParts], step2[kParts], behind[kParts];
 };
 
 HWY_INLINE V squared_residual(const V* c, const Seen& s, V zx, V zy) {
@@ -89,39 +93,49 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   return sum;
 }
 
-/// The points of a part while they are refined: the best place so far and sum |r|^2 there.
-struct Refined {
-  V X0, X1, X2, square;
+/// Sum |r|^2 of a track, and sum rho(|r|^2): the same without a loss.
+struct TrackCost {
+  V square, cost;
 };
 
-/// One pass over a group's observations at X: sum |r|^2 and, if asked for, the point's sums.
-template <bool kLinearize>
-HWY_INLINE V pass_group(const TrialInput& in, const Batches::Group& group, int lane, V X0, V X1,
-                        V X2, PointSums& sums) {
+/// The points of a part while they are refined: the best place so far and what it costs.
+struct Refined {
+  V X0, X1, X2;
+  TrackCost at;
+};
+
+/// One pass over a group's observations at X: their cost and, if asked for, the point's sums.
+template <bool Robust, bool kLinearize>
+HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& group, int lane, V X0,
+                                V X1, V X2, PointSums& sums) {
   const Batches& batches = *in.batches;
-  V square = zero();
+  V square = zero(), cost = zero();
   if (kLinearize) sums.clear();
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     V c[16];
     load_cameras<2>(in.trial_cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
     const double* z = &batches.xy[16 * b + lane];
     if (kLinearize) {
-      const LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), nullptr);
+      LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), nullptr);
       square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
+      if constexpr (Robust) cost = hn::Add(cost, apply_loss(in.loss, j).value);
       sums.add(j);
     } else {
-      square = hn::Add(square, squared_residual(c, see(c, X0, X1, X2), load(z), load(z + 8)));
+      const V r2 = squared_residual(c, see(c, X0, X1, X2), load(z), load(z + 8));
+      square = hn::Add(square, r2);
+      if constexpr (Robust) cost = hn::Add(cost, rho_lanes(LossLanes(in.loss), r2).value);
     }
   }
-  return square;
+  return {square, Robust ? cost : square};
 }
 
 /// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
 /// worth a pass and lower that point's own cost (kernels.h, inner_iterations).
+template <bool Robust>
 HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group, int lane,
                               const double* pd, V mask, Refined& best) {
   PointSums p;
-  best.square = pass_group<true>(in, group, lane, best.X0, best.X1, best.X2, p);
+  best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, p);
   auto active = hn::Gt(mask, zero());
   const double mean = in.mean_square * group.track;
   const V worth_one = set(inner_iterations::kWorthOne * mean);
@@ -140,11 +154,14 @@ HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group,
     const auto far = hn::And(active, hn::Gt(decrease, worth_more));
     steps_left = hn::AllFalse(D(), far) ? 0 : steps_left - 1;
     const V Y0 = hn::Add(best.X0, d[0]), Y1 = hn::Add(best.X1, d[1]), Y2 = hn::Add(best.X2, d[2]);
-    const V square = steps_left > 0 ? pass_group<true>(in, group, lane, Y0, Y1, Y2, p)
-                                    : pass_group<false>(in, group, lane, Y0, Y1, Y2, p);
-    active = hn::And(active, hn::Lt(square, best.square));
-    best = {hn::IfThenElse(active, Y0, best.X0), hn::IfThenElse(active, Y1, best.X1),
-            hn::IfThenElse(active, Y2, best.X2), hn::IfThenElse(active, square, best.square)};
+    const TrackCost at = steps_left > 0 ? pass_group<Robust, true>(in, group, lane, Y0, Y1, Y2, p)
+                                        : pass_group<Robust, false>(in, group, lane, Y0, Y1, Y2, p);
+    active = hn::And(active, hn::Lt(at.cost, best.at.cost));
+    best = {hn::IfThenElse(active, Y0, best.X0),
+            hn::IfThenElse(active, Y1, best.X1),
+            hn::IfThenElse(active, Y2, best.X2),
+            {hn::IfThenElse(active, at.square, best.at.square),
+             hn::IfThenElse(active, at.cost, best.at.cost)}};
     active = hn::And(active, far);
   }
 }
@@ -166,6 +183,7 @@ HWY_INLINE V count_crossed(const TrialInput& in, const Batches::Group& group, in
   return behind;
 }
 
+template <bool Robust>
 HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, std::size_t g,
                            int part, double* stepped, TrialSums& sums) {
   const Batches& batches = *in.batches;
@@ -178,42 +196,67 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
     const std::uint64_t b = group.first_batch + o;
     V c[24];
     load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-    add_coupled(c, see(c, X[0], X[1], X[2]), s);
+    add_coupled(c, see(c, X[0], X[1], X[2]), Robust ? in.weights + 8 * b + lane : nullptr, s);
   }
   V d[3];
   const V mask = lane_mask(group.lanes, lane);
   if (group.lanes < 8)  // masked lanes stay where they are
     for (V& x : s) x = hn::Mul(x, mask);
   const V damping = back_substitute(pd, s, d);
-  Refined y{hn::Add(X[0], d[0]), hn::Add(X[1], d[1]), hn::Add(X[2], d[2]), zero()};
+  Refined y{hn::Add(X[0], d[0]), hn::Add(X[1], d[1]), hn::Add(X[2], d[2]), {zero(), zero()}};
   PointSums unused;
   if (in.inner_iterations > 0)
-    refine_points(in, group, lane, pd, mask, y);
+    refine_points<Robust>(in, group, lane, pd, mask, y);
   else
-    y.square = pass_group<false>(in, group, lane, y.X0, y.X1, y.X2, unused);
+    y.at = pass_group<Robust, false>(in, group, lane, y.X0, y.X1, y.X2, unused);
   double* Y = stepped + kPointGroup * g + lane;
   store(y.X0, Y), store(y.X1, Y + 8), store(y.X2, Y + 16);
   const V d0 = hn::Sub(y.X0, X[0]), d1 = hn::Sub(y.X1, X[1]), d2 = hn::Sub(y.X2, X[2]);
   const V moved = fma(d0, d0, fma(d1, d1, hn::Mul(d2, d2)));
   const V x2 = fma(X[0], X[0], fma(X[1], X[1], fma(X[2], X[2], set(1e-300))));
-  sums.square[part] = fma(y.square, mask, sums.square[part]);
+  sums.square[part] = fma(y.at.square, mask, sums.square[part]);
+  if (Robust) sums.loss[part] = fma(y.at.cost, mask, sums.loss[part]);
   sums.damping[part] = fma(damping, mask, sums.damping[part]);
   sums.step2[part] = hn::Max(sums.step2[part], hn::Div(moved, x2));
   if (in.count_newly_behind)
     sums.behind[part] = fma(count_crossed(in, group, lane, X, y), mask, sums.behind[part]);
 }
 
+template <bool Robust>
 inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
   TrialSums sums;
   for (int p = 0; p < kParts; ++p)
-    sums.square[p] = sums.damping[p] = sums.step2[p] = sums.behind[p] = zero();
+    sums.square[p] = sums.loss[p] = sums.damping[p] = sums.step2[p] = sums.behind[p] = zero();
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
-    for (int p = 0; p < kParts; ++p) trial_part(in, in.batches->groups[g], g, p, out.points, sums);
+    for (int p = 0; p < kParts; ++p)
+      trial_part<Robust>(in, in.batches->groups[g], g, p, out.points, sums);
   out.square_sum += sum_parts(sums.square);
+  if (Robust) out.loss_sum += sum_parts(sums.loss);
   out.damping_term += sum_parts(sums.damping);
   const double step2 = max_parts(sums.step2);
   out.step2_max = step2 > out.step2_max ? step2 : out.step2_max;
   out.newly_behind += static_cast<std::uint64_t>(sum_parts(sums.behind));
+}
+
+/// |r_x| and |r_y| of every lane, masked ones included.
+inline void residuals_chunk(const Batches& batches, const double* cameras, const double* points,
+                            const Chunk& chunk, double* out) {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group group = batches.groups[g];
+    for (int lane = 0; lane < 8; lane += kLanes) {
+      const double* X = points + kPointGroup * g + lane;
+      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+        V c[16];
+        load_cameras<2>(cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+        const double* z = &batches.xy[16 * b + lane];
+        const Seen seen = see(c, load(X), load(X + 8), load(X + 16));
+        const V fd = hn::Mul(c[12], distortion(c, seen.n));
+        double* to = out + 16 * (b - chunk.first_batch) + lane;
+        store(hn::Abs(fms(fd, seen.x, load(z))), to);
+        store(hn::Abs(fms(fd, seen.y, load(z + 8))), to + 8);
+      }
+    }
+  }
 }
 
 inline double square_sum_chunk(const Batches& batches, const double* cameras, const double* points,

@@ -11,6 +11,7 @@
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "solve/choose_solver.h"
+#include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
 
 namespace sheaf {
@@ -64,6 +65,12 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (!(options.time_limit_s >= 0)) return usage("time_limit_s is negative or not a number");
   if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
   if (options.threads < 0) return usage("threads is negative");
+  const Loss& loss = options.loss;
+  if (!(loss.scale_px >= 0 && std::isfinite(loss.scale_px)))
+    return usage("the scale of the loss is negative or not finite");
+  if (loss.graduated && is_convex(loss.kind))
+    return usage(std::string("the loss ") + to_string(loss.kind) +
+                 " is convex: there is nothing to graduate");
   return {};
 }
 
@@ -80,13 +87,15 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   Columns columns = number_columns(problem, options.fixed);
   const std::uint64_t resident = resident_bytes();
   Batches batches = arrange(problem, skip);
-  const WorkCounts counts = count_work(batches, columns, options.fixed.points);
+  WorkCounts counts = count_work(batches, columns, options.fixed.points);
+  counts.weighted = options.loss.kind != LossKind::none;
   Result<Choice> choice = choose_solver(counts, options, threads.count(), resident);
   if (!choice.ok()) return choice.error();
   summary.solver = to_string(choice.value().plan.kind);
   summary.solver_reason = choice.value().plan.reason;
   summary.forecast_bytes = choice.value().forecast_bytes;
   summary.simd = kernels.name;
+  summary.loss = options.loss.kind;
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
 
@@ -99,7 +108,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   SolveOptions resolved = options;
   if (resolved.initial_damping == 0)
     resolved.initial_damping = default_damping(problem.num_images());
-  minimize(system, resolved, clock, summary);
+  minimize_in_rounds(system, resolved, clock, summary);
   system.store(problem);
   summary.solve_s = clock.seconds() - summary.setup_s;
   if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
@@ -126,8 +135,8 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
   }
   const std::size_t used = problem.num_observations() - summary.rejected_observations.size();
-  summary.initial_rms_px = rms(summary.initial_cost, used);
-  summary.final_rms_px = rms(summary.final_cost, used);
+  summary.initial_rms_px = rms(summary.initial_plain_cost, used);
+  summary.final_rms_px = rms(summary.final_plain_cost, used);
   return summary;
 }
 

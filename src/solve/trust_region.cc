@@ -49,15 +49,16 @@ struct Damping {
 
 class Loop {
  public:
-  Loop(System& system, const SolveOptions& options, const Stopwatch& clock, Summary& summary)
-      : system_(system), options_(options), since_start_(clock), summary_(summary) {
+  Loop(System& system, const ScaledLoss& loss, const SolveOptions& options, const Stopwatch& clock,
+       Summary& summary)
+      : system_(system), loss_(loss), options_(options), since_start_(clock), summary_(summary) {
     damping_.lambda = options.initial_damping > 0 ? options.initial_damping : default_damping(1);
   }
 
   void run() {
     while (!done_) {
-      const Step step = system_.propose({damping_.lambda, forcing_, &cancelled_});
-      if (summary_.iterations.empty()) begin(step);
+      const Step step = system_.propose({damping_.lambda, forcing_, loss_, &cancelled_});
+      if (!begun_) begin(step);
       if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
       if (!step.solved && out_of_time()) break;
       if (!step.solved) {
@@ -72,15 +73,22 @@ class Loop {
         reject(tried);
     }
     summary_.final_cost = cost_;
+    summary_.final_plain_cost = plain_cost_;
   }
 
  private:
-  /// The start: nothing tried yet.
+  /// The start: nothing tried yet. Later rounds go on from where the one before ended.
   void begin(const Step& step) {
-    cost_ = step.cost;
+    begun_ = true;
+    // A round that goes on keeps its cost: another order of sums would change its last bits.
+    const bool goes_on = !summary_.rounds.empty() && summary_.rounds.back().steps > 0;
+    cost_ = goes_on ? summary_.final_cost : step.cost;
+    plain_cost_ = goes_on ? summary_.final_plain_cost : step.plain_cost;
+    if (!summary_.iterations.empty()) return;
     summary_.initial_cost = cost_;
+    summary_.initial_plain_cost = plain_cost_;
     Iteration start;
-    start.cost = start.trial_cost = cost_;
+    start.cost = start.trial_cost = start.start_cost = cost_;
     start.damping = damping_.lambda;
     start.gradient_max = step.gradient_max;
     if (!std::isfinite(cost_)) {
@@ -94,7 +102,8 @@ class Loop {
   Iteration record(const Step& step, const std::optional<Trial>& trial) const {
     Iteration it;
     it.index = static_cast<int>(summary_.iterations.size());
-    it.cost = cost_;
+    it.round = std::max(0, static_cast<int>(summary_.rounds.size()) - 1);
+    it.cost = it.start_cost = cost_;
     it.trial_cost = trial ? trial->cost : std::numeric_limits<double>::quiet_NaN();
     it.accepted = false;
     it.damping = damping_.lambda;
@@ -117,12 +126,13 @@ class Loop {
     system_.accept();
     const double decrease = (cost_ - trial.cost) / cost_;
     cost_ = it.cost = trial.cost;
+    plain_cost_ = trial.plain_cost;
     it.accepted = true;
     damping_.shrink(it.gain_ratio);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     small_decreases_ = decrease < options_.tolerance ? small_decreases_ + 1 : 0;
     publish(it);
-    if (small_decreases_ >= 2)
+    if (small_decreases_ >= (std::isinf(options_.tolerance) ? 1 : 2))
       end(Termination::cost_converged,
           "converged: the cost fell by less than the tolerance, relatively, twice in a row");
   }
@@ -193,6 +203,7 @@ class Loop {
   }
 
   System& system_;
+  const ScaledLoss loss_;
   const SolveOptions& options_;
   const Stopwatch& since_start_;
   const Stopwatch since_begin_;
@@ -201,10 +212,10 @@ class Loop {
   /// An iterative solver solves loosely at first and tighter as the cost settles.
   double forcing_ = kLoosestForcing;
   const std::function<bool()> cancelled_ = [this] { return must_stop(); };
-  double cost_ = 0;
+  double cost_ = 0, plain_cost_ = 0;
   int small_decreases_ = 0;
   bool any_finite_trial_ = false;
-  bool done_ = false;
+  bool begun_ = false, done_ = false;
 };
 
 }  // namespace
@@ -214,9 +225,9 @@ double default_damping(std::size_t images) {
   return std::min(1e-2, 2e-5 * std::pow(scale, 4));
 }
 
-void minimize(System& system, const SolveOptions& options, const Stopwatch& since_start,
-              Summary& summary) {
-  Loop(system, options, since_start, summary).run();
+void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
+              const Stopwatch& since_start, Summary& summary) {
+  Loop(system, loss, options, since_start, summary).run();
 }
 
 }  // namespace sheaf

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "geometry/rotation.h"
@@ -17,7 +17,7 @@ namespace {
 
 /// Everything that the kernels produce from one state.
 struct Outcome {
-  Buffer<double> tiles, diagonal, factors, trial_points, product;
+  Buffer<double> tiles, diagonal, factors, trial_points, product, weights, residuals;
   EliminateOutput eliminated{};
   TrialOutput trial{};
   double square_sum = 0;
@@ -77,9 +77,11 @@ class KernelsTest : public ::testing::Test {
     out.factors.fill(0);
     out.trial_points.allocate(points_.size());
     Buffer<double> scratch(scratch_doubles(batches_, chunks_));
-    const EliminateInput in{&batches_,      &chunks_, cameras_.data(),
-                            points_.data(), 1e-3,     points_held_};
+    const EliminateInput in{&batches_,    &chunks_, cameras_.data(), points_.data(), 1e-3,
+                            points_held_, loss_};
     out.eliminated.factors = out.factors.data();
+    if (loss_.kind != LossKind::none) out.weights.allocate(8 * batches_.num_batches());
+    out.eliminated.weights = out.weights.data();
     const Records records = records_in(scratch.data(), chunks_);
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.linearize(in, chunk, records, out.eliminated);
@@ -93,20 +95,28 @@ class KernelsTest : public ::testing::Test {
                            out.factors.data(),
                            true,
                            points_held_ ? 0 : inner_iterations_,
-                           kMeanSquare};
+                           kMeanSquare,
+                           loss_,
+                           out.weights.data()};
     out.trial.points = out.trial_points.data();
     out.product.allocate(kProductRecord * 9);
     out.product.fill(0);
     Buffer<double> saved(product_scratch_doubles(batches_));
-    const ProductInput product{&batches_, cameras_.data(), points_.data(), out.factors.data()};
+    const ProductInput product{&batches_, cameras_.data(), points_.data(), out.factors.data(),
+                               out.weights.data()};
+    out.residuals.allocate(16 * batches_.num_batches());
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.product(product, chunk, saved.data(), out.product.data());
       kernels.trial(trial, chunk, out.trial);
+      kernels.residuals(batches_, cameras_.data(), points_.data(), chunk,
+                        &out.residuals[16 * chunk.first_batch]);
       out.square_sum += kernels.square_sum(batches_, cameras_.data(), points_.data(), chunk);
       out.behind += kernels.count_behind(batches_, cameras_.data(), points_.data(), chunk);
     }
     return out;
   }
+
+  void expect_agreement(double slack = 1);
 
   Batches batches_;
   Chunks chunks_;
@@ -114,7 +124,11 @@ class KernelsTest : public ::testing::Test {
   bool points_held_ = false;
   int inner_iterations_ = 3;
   static constexpr double kMeanSquare = 1;  ///< px^2: every point has something to gain
+  ScaledLoss loss_;
 };
+
+constexpr LossKind kLosses[] = {LossKind::huber, LossKind::soft_l1, LossKind::cauchy,
+                                LossKind::tukey, LossKind::geman_mcclure};
 
 void expect_close(const Buffer<double>& a, const Buffer<double>& b, double tolerance,
                   const std::string& what) {
@@ -130,37 +144,72 @@ void expect_close(const Buffer<double>& a, const Buffer<double>& b, double toler
 void clear_padding(const Batches& batches, Outcome& o) {
   for (std::size_t g = 0; g < batches.groups.size(); ++g)
     for (std::uint32_t l = batches.groups[g].lanes; l < 8; ++l) {
+      for (std::uint32_t k = 0; k < batches.groups[g].track && o.weights.size() > 0; ++k)
+        o.weights[8 * (batches.groups[g].first_batch + k) + l] = 0;
       for (int k = 0; k < 12; ++k) o.factors[kFactorGroup * g + 8 * k + l] = 0;
       for (int k = 0; k < 3; ++k) o.trial_points[kPointGroup * g + 8 * k + l] = 0;
     }
 }
 
+void KernelsTest::expect_agreement(double slack) {
+  Outcome expected = run(reference_kernels());
+  clear_padding(batches_, expected);
+  for (const Kernels* kernels : available_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    Outcome got = run(*kernels);
+    clear_padding(batches_, got);
+    expect_close(got.tiles, expected.tiles, 1e-9, "tile");
+    expect_close(got.diagonal, expected.diagonal, 1e-8, "diagonal");
+    expect_close(got.factors, expected.factors, 1e-9, "factor");
+    const auto near = [=](double a, double b) { EXPECT_NEAR(a, b, slack * 1e-10 * std::abs(b)); };
+    expect_close(got.weights, expected.weights, 1e-9, "weight");
+    expect_close(got.residuals, expected.residuals, 1e-9, "residual");
+    near(got.eliminated.loss_sum, expected.eliminated.loss_sum);
+    near(got.trial.loss_sum, expected.trial.loss_sum);
+    expect_close(got.product, expected.product, 1e-7, "product");
+    expect_close(got.trial_points, expected.trial_points, slack * 1e-11, "trial point");
+    near(got.eliminated.square_sum, expected.eliminated.square_sum);
+    near(got.eliminated.point_decrease, expected.eliminated.point_decrease);
+    near(got.eliminated.gradient_max2, expected.eliminated.gradient_max2);
+    near(got.trial.square_sum, expected.trial.square_sum);
+    near(got.trial.damping_term, expected.trial.damping_term);
+    near(got.trial.step2_max, expected.trial.step2_max);
+    near(got.square_sum, expected.square_sum);
+    EXPECT_EQ(got.trial.newly_behind, expected.trial.newly_behind);
+    EXPECT_EQ(got.behind, expected.behind);
+    EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
+  }
+}
+
 TEST_F(KernelsTest, EveryInstructionSetMatchesTheReference) {
   for (ChunkLists lists : {ChunkLists::none, ChunkLists::diagonal, ChunkLists::pairs}) {
     make(lists == ChunkLists::diagonal, lists);
-    Outcome expected = run(reference_kernels());
-    clear_padding(batches_, expected);
-    for (const Kernels* kernels : available_kernels()) {
-      SCOPED_TRACE(kernels->name);
-      Outcome got = run(*kernels);
-      clear_padding(batches_, got);
-      expect_close(got.tiles, expected.tiles, 1e-9, "tile");
-      expect_close(got.diagonal, expected.diagonal, 1e-8, "diagonal");
-      expect_close(got.factors, expected.factors, 1e-9, "factor");
-      expect_close(got.product, expected.product, 1e-7, "product");
-      expect_close(got.trial_points, expected.trial_points, 1e-11, "trial point");
-      const auto near = [](double a, double b) { EXPECT_NEAR(a, b, 1e-10 * std::abs(b)); };
-      near(got.eliminated.square_sum, expected.eliminated.square_sum);
-      near(got.eliminated.point_decrease, expected.eliminated.point_decrease);
-      near(got.eliminated.gradient_max2, expected.eliminated.gradient_max2);
-      near(got.trial.square_sum, expected.trial.square_sum);
-      near(got.trial.damping_term, expected.trial.damping_term);
-      near(got.trial.step2_max, expected.trial.step2_max);
-      near(got.square_sum, expected.square_sum);
-      EXPECT_EQ(got.trial.newly_behind, expected.trial.newly_behind);
-      EXPECT_EQ(got.behind, expected.behind);
-      EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
+    expect_agreement();
+  }
+}
+
+TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceWithALoss) {
+  for (ChunkLists lists : {ChunkLists::diagonal, ChunkLists::pairs})
+    for (LossKind kind : kLosses) {
+      SCOPED_TRACE(to_string(kind));
+      make(lists == ChunkLists::diagonal, lists);
+      loss_ = {kind, kind == LossKind::tukey ? 40.0 : 5.0};
+      // Points whose weights are small are loose: inner iterations move them by rounding.
+      expect_agreement(1000);
     }
+}
+
+TEST_F(KernelsTest, AWideLossIsNone) {
+  make(false, ChunkLists::pairs);
+  const Outcome plain = run(*available_kernels().front());
+  for (LossKind kind : kLosses) {
+    loss_ = {kind, 1e9};
+    const Outcome wide = run(*available_kernels().front());
+    EXPECT_NEAR(wide.eliminated.loss_sum, plain.eliminated.square_sum,
+                1e-9 * plain.eliminated.square_sum);
+    EXPECT_EQ(wide.eliminated.square_sum, plain.eliminated.square_sum);
+    expect_close(wide.product, plain.product, 1e-6, "product");
+    expect_close(wide.tiles, plain.tiles, 1e-6, "tile");
   }
 }
 
@@ -204,20 +253,27 @@ TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
   for (const Kernels* kernels : available_kernels())
     if (kernels->fused) fused.push_back(kernels);
   if (fused.size() < 2) GTEST_SKIP() << "this machine runs fewer than two such sets";
-  const Outcome first = run(*fused[0]);
-  for (std::size_t k = 1; k < fused.size(); ++k) {
-    SCOPED_TRACE(fused[k]->name);
-    const Outcome other = run(*fused[k]);
-    const auto same = [](const Buffer<double>& a, const Buffer<double>& b) {
-      return std::memcmp(a.data(), b.data(), a.bytes()) == 0;
-    };
-    EXPECT_TRUE(same(first.tiles, other.tiles));
-    EXPECT_TRUE(same(first.diagonal, other.diagonal));
-    EXPECT_TRUE(same(first.factors, other.factors));
-    EXPECT_TRUE(same(first.trial_points, other.trial_points));
-    EXPECT_TRUE(same(first.product, other.product));
-    EXPECT_EQ(first.trial.square_sum, other.trial.square_sum);
-    EXPECT_EQ(first.eliminated.square_sum, other.eliminated.square_sum);
+  for (LossKind kind : {LossKind::none, LossKind::huber, LossKind::soft_l1, LossKind::cauchy,
+                        LossKind::tukey, LossKind::geman_mcclure}) {
+    SCOPED_TRACE(to_string(kind));
+    loss_ = {kind, 5};
+    const Outcome first = run(*fused[0]);
+    for (std::size_t k = 1; k < fused.size(); ++k) {
+      SCOPED_TRACE(fused[k]->name);
+      const Outcome other = run(*fused[k]);
+      const auto same = [](const Buffer<double>& a, const Buffer<double>& b) {
+        return std::equal(a.begin(), a.end(), b.begin(), b.end());
+      };
+      EXPECT_TRUE(same(first.tiles, other.tiles));
+      EXPECT_TRUE(same(first.diagonal, other.diagonal));
+      EXPECT_TRUE(same(first.factors, other.factors));
+      EXPECT_TRUE(same(first.trial_points, other.trial_points));
+      EXPECT_TRUE(same(first.product, other.product));
+      EXPECT_EQ(first.trial.square_sum, other.trial.square_sum);
+      EXPECT_EQ(first.eliminated.square_sum, other.eliminated.square_sum);
+      EXPECT_EQ(first.eliminated.loss_sum, other.eliminated.loss_sum);
+      EXPECT_EQ(first.trial.loss_sum, other.trial.loss_sum);
+    }
   }
 }
 

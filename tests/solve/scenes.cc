@@ -7,9 +7,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <numbers>
 
 #include "geometry/bal_camera.h"
 #include "geometry/rigid_motion.h"
+#include "platform/random.h"
 
 namespace sheaf {
 namespace {
@@ -17,13 +19,13 @@ namespace {
 /// move(problem, x) puts one parameter x away from where it is.
 using Move = std::function<void(Problem&, double)>;
 
-double derivative_ratio(const Problem& problem, const Move& move) {
+double derivative_ratio(const Problem& problem, const ScaledLoss& loss, const Move& move) {
   const auto cost = [&](double x) {
     Problem moved = problem;
     move(moved, x);
-    return evaluate(moved).cost;
+    return loss.kind == LossKind::none ? evaluate(moved).cost : robust_cost(moved, loss);
   };
-  const double middle = evaluate(problem).cost;
+  const double middle = cost(0);
   // A first step gauges the curvature, the second is then a fair part of a pixel over all rows.
   double h = 1e-6, curvature = 0;
   for (int round = 0; round < 3; ++round) {
@@ -44,6 +46,21 @@ Move pose_move(std::size_t image, int k) {
         left_perturbed(RigidMotion<double>{pose.rotation, pose.translation}, rho, phi);
     pose = {moved.rotation, moved.translation};
   };
+}
+
+/// cam_from_world of observation i's image, and its point in that camera's frame.
+Vector3<double> in_camera(const Problem& problem, std::size_t i) {
+  const Pose& pose = problem.poses[problem.observation_image[i]];
+  const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
+  Vector3<double> P =
+      multiply(matrix_from_quaternion(pose.rotation), Vector3<double>{X[0], X[1], X[2]});
+  for (int k = 0; k < 3; ++k) P[k] += pose.translation[k];
+  return P;
+}
+
+std::array<double, 2> pixel_of(const Problem& problem, std::size_t i) {
+  const auto& k = problem.cameras[problem.image_camera[problem.observation_image[i]]].parameters;
+  return project(BalCamera<double>{k[0], k[1], k[2]}, in_camera(problem, i));
 }
 
 bool listed(const std::vector<std::uint32_t>& ids, std::size_t i) {
@@ -85,10 +102,61 @@ Scene shared_lens_scene(std::uint32_t together, bool keep_unused) {
   return scene;
 }
 
-double scaled_gradient(const Problem& problem, const Fixed& fixed, std::size_t points) {
+double robust_cost(const Problem& problem, const ScaledLoss& loss) {
+  double sum = 0;
+  for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    const auto u = pixel_of(problem, i);
+    const double x = u[0] - problem.observation_xy[2 * i],
+                 y = u[1] - problem.observation_xy[2 * i + 1];
+    sum += evaluate_loss(loss, x * x + y * y).value;
+  }
+  return sum / 2;
+}
+
+Problem with_pixels(const Problem& truth, const Pixels& pixels) {
+  Problem out = truth;
+  Random noise(pixels.seed, 0), wrong(pixels.seed, 1);
+  for (std::size_t i = 0; i < out.num_observations(); ++i) {
+    const auto u = pixel_of(truth, i);
+    for (int k = 0; k < 2; ++k)
+      out.observation_xy[2 * i + k] = u[k] + pixels.noise_px * noise.normal();
+    const double angle = wrong.uniform(0, 2 * std::numbers::pi);
+    if (wrong.uniform() >= pixels.outliers) continue;
+    out.observation_xy[2 * i] += pixels.outlier_px * std::cos(angle);
+    out.observation_xy[2 * i + 1] += pixels.outlier_px * std::sin(angle);
+  }
+  return out;
+}
+
+void disturb(Problem& problem, const Disturbance& by) {
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < problem.num_observations(); ++i)
+    depths.push_back(std::abs(in_camera(problem, i)[2]));
+  std::nth_element(depths.begin(), depths.begin() + depths.size() / 2, depths.end());
+  const double unit = depths[depths.size() / 2];
+  Random random(by.seed, 2);
+  const auto normal = [&](double sigma) {
+    return Vector3<double>{sigma * random.normal(), sigma * random.normal(),
+                           sigma * random.normal()};
+  };
+  for (Pose& pose : problem.poses) {
+    // A left turn by phi about the camera's centre leaves the centre where it is, so that the two
+    // noises are apart: t <- exp(phi) t - shift.
+    const auto moved = left_perturbed(RigidMotion<double>{pose.rotation, pose.translation}, {},
+                                      normal(by.rotation_rad));
+    pose = {moved.rotation, moved.translation};
+    const Vector3<double> shift = normal(by.center * unit);
+    for (int k = 0; k < 3; ++k) pose.translation[k] += shift[k];
+  }
+  for (Camera& camera : problem.cameras) camera.parameters[0] *= 1 + by.focal * random.normal();
+  for (double& x : problem.points) x += by.point * unit * random.normal();
+}
+
+double scaled_gradient(const Problem& problem, const Fixed& fixed, std::size_t points,
+                       const ScaledLoss& loss) {
   double largest = 0;
   const auto take = [&](const Move& move) {
-    largest = std::max(largest, derivative_ratio(problem, move));
+    largest = std::max(largest, derivative_ratio(problem, loss, move));
   };
   for (std::size_t i = 0; i < problem.num_images(); ++i)
     for (int k = 0; k < 6 && !fixed.poses && !listed(fixed.pose_ids, i); ++k) take(pose_move(i, k));

@@ -27,9 +27,10 @@ class Solvers : public testing::TestWithParam<Case> {
     return options;
   }
 
-  void expect_same_optimum(const Problem& start, const Fixed& fixed = {}) {
+  void expect_same_optimum(const Problem& start, const Fixed& fixed = {}, const Loss& loss = {}) {
     SolveOptions options = tight();
     options.fixed = fixed;
+    options.loss = loss;
     options.solver = CameraSolverKind::dense;
     Problem reference = start;
     const double expected = solve(reference, options).final_cost;
@@ -38,7 +39,9 @@ class Solvers : public testing::TestWithParam<Case> {
     const Summary s = solve(problem, options);
     EXPECT_TRUE(s.usable()) << s.words;
     EXPECT_NEAR(s.final_cost, expected, 1e-8 * expected);
-    EXPECT_LT(scaled_gradient(problem, fixed), 1e-3 * scaled_gradient(start, fixed));
+    const ScaledLoss scaled{loss.kind, loss.scale_px};
+    EXPECT_LT(scaled_gradient(problem, fixed, 40, scaled),
+              1e-3 * scaled_gradient(start, fixed, 40, scaled));
   }
 };
 
@@ -58,6 +61,15 @@ TEST_P(Solvers, AgreeOnAScene) {
   Problem on_true_points = scene.start;
   on_true_points.points = scene.truth.points;
   expect_same_optimum(on_true_points, points_held());
+}
+
+TEST_P(Solvers, AgreeWithALoss) {
+  const Scene scene = small_scene();
+  expect_same_optimum(scene.start, {}, Huber{1});
+  expect_same_optimum(scene.start, {}, Cauchy{1});
+  Problem on_true_points = scene.start;
+  on_true_points.points = scene.truth.points;
+  expect_same_optimum(on_true_points, points_held(), Huber{1});
 }
 
 TEST_P(Solvers, AgreeOnSharedLenses) {
@@ -87,15 +99,18 @@ TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
   SolveOptions options;
   options.solver = GetParam().solver;
   options.max_iterations = 4;
-  options.threads = 1;
-  Problem expected = start;
-  const Summary reference = solve(expected, options);
-  EXPECT_LT(reference.final_cost, reference.initial_cost);
-  for (int threads : {2, 5, 16}) {
-    options.threads = threads;
-    Problem problem = start;
-    EXPECT_EQ(solve(problem, options).final_cost, reference.final_cost) << threads << " threads";
-    EXPECT_EQ(problem.points, expected.points) << threads << " threads";
+  for (const Loss& loss : {Loss(), Loss(Cauchy())}) {
+    options.loss = loss;
+    options.threads = 1;
+    Problem expected = start;
+    const Summary reference = solve(expected, options);
+    EXPECT_LT(reference.final_cost, reference.initial_cost);
+    for (int threads : {2, 5, 16}) {
+      options.threads = threads;
+      Problem problem = start;
+      EXPECT_EQ(solve(problem, options).final_cost, reference.final_cost) << threads << " threads";
+      EXPECT_EQ(problem.points, expected.points) << threads << " threads";
+    }
   }
 }
 

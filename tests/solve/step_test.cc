@@ -41,7 +41,7 @@ struct Normal {
   std::vector<double> A, b;
   double cost = 0;
 
-  Normal(const Problem& p, const Places& at)
+  Normal(const Problem& p, const Places& at, const ScaledLoss& loss)
       : A(static_cast<std::size_t>(at.count) * at.count), b(at.count) {
     for (std::size_t i = 0; i < p.num_observations(); ++i) {
       const std::size_t image = p.observation_image[i], point = p.observation_point[i];
@@ -51,21 +51,25 @@ struct Normal {
           matrix_from_quaternion(p.poses[image].rotation), p.poses[image].translation,
           {k[0], k[1], k[2]},
           {p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
+      const double r[2] = {j.pixel[0] - p.observation_xy[2 * i],
+                           j.pixel[1] - p.observation_xy[2 * i + 1]};
+      const LossValue<double> rho = evaluate_loss(loss, r[0] * r[0] + r[1] * r[1]);
+      cost += rho.value / 2;
+      const double w = std::sqrt(rho.first);
       for (int row = 0; row < 2; ++row) {
         std::vector<std::pair<int, double>> entries;
         for (int c = 0; c < 6; ++c)
-          entries.emplace_back(at.pose[6 * image + c], j.camera[9 * row + c]);
+          entries.emplace_back(at.pose[6 * image + c], w * j.camera[9 * row + c]);
         for (int c = 0; c < 3; ++c)
-          entries.emplace_back(at.lens[3 * lens + c], j.camera[9 * row + 6 + c]);
+          entries.emplace_back(at.lens[3 * lens + c], w * j.camera[9 * row + 6 + c]);
         for (int c = 0; c < 3; ++c)
-          entries.emplace_back(at.point[3 * point + c], j.point[3 * row + c]);
-        add_row(entries, j.pixel[row] - p.observation_xy[2 * i + row]);
+          entries.emplace_back(at.point[3 * point + c], w * j.point[3 * row + c]);
+        add_row(entries, w * r[row]);
       }
     }
   }
 
   void add_row(const std::vector<std::pair<int, double>>& entries, double r) {
-    cost += r * r / 2;
     for (const auto& [a, va] : entries) {
       if (a < 0) continue;
       b[a] -= va * r;
@@ -121,9 +125,11 @@ Problem first_points(const Problem& p, std::uint32_t points) {
   return out;
 }
 
-void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping) {
+void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
+                          const Loss& loss = {}) {
   const Places at(start, fixed);
-  const Normal normal(start, at);
+  const ScaledLoss scaled{loss.kind, loss.scale_px};
+  const Normal normal(start, at, scaled);
   const std::size_t n = normal.b.size();
   std::vector<double> A = normal.A, D(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -139,12 +145,13 @@ void expect_textbook_step(const Problem& start, const Fixed& fixed, double dampi
   const double predicted = linear - quadratic / 2;  // by definition: cost - 1/2 |r + J x|^2
   Problem stepped = start;
   move(stepped, at, x);
-  const double trial = evaluate(stepped).cost;
+  const double trial = robust_cost(stepped, scaled);
 
   Problem problem = start;
   SolveOptions options;
   options.fixed = fixed;
   options.initial_damping = damping;
+  options.loss = loss;
   options.inner_iterations = 0;  // the textbook has none
   options.max_iterations = 1;
   options.gradient_tolerance = 0;
@@ -186,6 +193,18 @@ TEST(Step, IsTheTextbooksWithPartsHeld) {
   poses_held.poses = true;
   for (const Fixed& fixed : {points_held(), distortion_held, singles, poses_held})
     for (double damping : kDampings) expect_textbook_step(problem, fixed, damping);
+}
+
+TEST(Step, IsTheTextbooksWithALoss) {
+  // Half a pixel: at the start most residuals lie beyond it.
+  const Problem problem = first_points(small_scene().start, 40);
+  for (const Loss& loss : {Loss(Huber{0.5}), Loss(SoftL1{0.5}), Loss(Cauchy{0.5}), Loss(Tukey{30}),
+                           Loss(GemanMcClure{0.5})})
+    for (const Fixed& fixed : {Fixed(), points_held()})
+      for (double damping : kDampings) {
+        SCOPED_TRACE(to_string(loss.kind));
+        expect_textbook_step(problem, fixed, damping, loss);
+      }
 }
 
 TEST(Step, IsTheTextbooksWithSharedLenses) {

@@ -67,6 +67,8 @@ class Valley : public System {
     for (int i = 0; i < 2; ++i) held_[i] += step_[i];
   }
 
+  double residual_scale(double) override { return 0; }
+
   void store(Problem&) const override {}
 
   double cost(const State& s) const {
@@ -96,7 +98,7 @@ constexpr Valley::State kNear{0.9, 0.8};  // and from here the linear model hold
 Summary minimized(Valley& valley, const SolveOptions& options = {}) {
   Summary summary;
   const Stopwatch clock;
-  minimize(valley, options, clock, summary);
+  minimize(valley, {}, options, clock, summary);
   EXPECT_FALSE(summary.words.empty());
   EXPECT_FALSE(summary.iterations.empty());
   for (std::size_t i = 0; i < summary.iterations.size(); ++i) {
