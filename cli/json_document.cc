@@ -16,6 +16,8 @@ constexpr std::size_t kMostListed = 1000;
 
 Json iteration_json(const Iteration& it) {
   return {{"index", it.index},
+          {"round", it.round},
+          {"start_cost", number(it.start_cost)},
           {"cost", number(it.cost)},
           {"trial_cost", number(it.trial_cost)},
           {"accepted", it.accepted},
@@ -37,6 +39,7 @@ Json options_json(const SolveArguments& a) {
   return {{"max_iterations", a.max_iterations},
           {"tolerance", a.tolerance},
           {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
+          {"loss", a.loss},
           {"cheirality", a.cheirality},
           {"fix", fix},
           {"solver", a.solver},
@@ -44,6 +47,20 @@ Json options_json(const SolveArguments& a) {
           {"initial_damping", a.initial_damping},
           {"inner_iterations", a.inner_iterations},
           {"simd", a.simd}};
+}
+
+Json loss_json(const Summary& s) {
+  Json rounds = Json::array();
+  for (const LossRound& round : s.rounds)
+    rounds.push_back({{"scale_px", round.scale_px > 0 ? number(round.scale_px) : Json()},
+                      {"sigma_px", round.sigma_px > 0 ? number(round.sigma_px) : Json()},
+                      {"initial_cost", number(round.initial_cost)},
+                      {"final_cost", number(round.final_cost)},
+                      {"steps", round.steps}});
+  return {{"name", to_string(s.loss)},
+          {"scale_px", s.loss == LossKind::none ? Json() : number(s.rounds.back().scale_px)},
+          {"sigma_px", s.final_sigma_px > 0 ? number(s.final_sigma_px) : Json()},
+          {"rounds", rounds}};
 }
 
 Json range_json(const Range& range) {
@@ -117,6 +134,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
           {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_resident_bytes()}}},
           {"initial_cost", number(s.initial_cost)},
           {"final_cost", number(s.final_cost)},
+          {"loss", loss_json(s)},
           {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
           {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
           {"iterations", iterations},

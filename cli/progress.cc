@@ -21,8 +21,11 @@ void Progress::report_plan(const Summary& summary) {
 }
 
 void Progress::report(const Iteration& it) {
-  const double change = it.index == 0 ? 0 : it.trial_cost - cost_;
-  cost_ = it.cost;
+  const double change = it.index == 0 ? 0 : it.trial_cost - it.start_cost;
+  if (style_ != Style::none && it.round != round_)
+    fmt::print(stderr, "round {}: the loss has another scale, the cost is {:.9e}\n", it.round + 1,
+               it.start_cost);
+  round_ = it.round;
   if (style_ == Style::table) {
     if (it.index == 0)
       fmt::print(stderr, "{:>5} {:>16} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "iter", "cost", "change",

@@ -17,7 +17,7 @@ class Progress {
  private:
   enum class Style { none, table, lines };
   Style style_;
-  double cost_ = 0;
+  int round_ = 0;
 };
 
 }  // namespace sheaf

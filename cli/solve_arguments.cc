@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -90,7 +92,55 @@ void add_solver_options(CLI::App& verb, SolveArguments& a) {
       ->capture_default_str();
 }
 
+constexpr LossKind kLosses[] = {LossKind::none,   LossKind::huber, LossKind::soft_l1,
+                                LossKind::cauchy, LossKind::tukey, LossKind::geman_mcclure};
+
+bool parse_loss_name(std::string_view name, LossKind& out) {
+  for (LossKind kind : kLosses)
+    if (name == to_string(kind)) {
+      out = kind;
+      return true;
+    }
+  return false;
+}
+
+bool parse_scale(std::string_view text, double& scale_px) {
+  scale_px = kAutomaticScale;
+  if (text.empty() || text == "auto") return true;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, scale_px);
+  return error == std::errc() && stop == end && scale_px > 0 && std::isfinite(scale_px);
+}
+
+/// Cuts the text up to the next colon off its front.
+std::string_view cut(std::string_view& rest) {
+  const std::size_t colon = std::min(rest.find(':'), rest.size());
+  const std::string_view part = rest.substr(0, colon);
+  rest.remove_prefix(std::min(colon + 1, rest.size()));
+  return part;
+}
+
 }  // namespace
+
+std::string parse_loss(const std::string& text, Loss& out) {
+  std::string_view rest = text;
+  const bool named = parse_loss_name(cut(rest), out.kind);
+  if (named && out.kind == LossKind::none && text == "none") return "";
+  constexpr std::string_view kGraduated = "gnc";
+  out.graduated = rest == kGraduated || rest.ends_with(":gnc");
+  if (out.graduated) rest.remove_suffix(std::min(rest.size(), kGraduated.size() + 1));
+  if (!named || out.kind == LossKind::none || text.ends_with(':') ||
+      !parse_scale(rest, out.scale_px))
+    return fmt::format(
+        "expected none, or huber, soft-l1, cauchy, tukey or geman-mcclure with :auto or a :SCALE "
+        "above 0 in pixels, not '{}'",
+        text);
+  const bool convex = out.kind == LossKind::huber || out.kind == LossKind::soft_l1;
+  if (out.graduated && convex)
+    return fmt::format("{} is convex: :gnc is for cauchy, tukey and geman-mcclure",
+                       to_string(out.kind));
+  return "";
+}
 
 std::string parse_fix(const std::string& list, Fixed& out) {
   std::string_view rest = list;
@@ -107,23 +157,23 @@ std::string parse_fix(const std::string& list, Fixed& out) {
   }
 }
 
-void add_solve_options(CLI::App& verb, SolveArguments& a) {
-  const double inf = std::numeric_limits<double>::infinity();
-  const double most = std::numeric_limits<double>::max();
-  verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
-      ->type_name("N")
-      ->check(whole_number_from(0, "a whole number from 0 up"))
+namespace {
+
+/// What is minimised.
+void add_model_options(CLI::App& verb, SolveArguments& a) {
+  verb.add_option("--loss", a.loss,
+                  "what large residuals count less by: none, huber, soft-l1, cauchy, tukey or "
+                  "geman-mcclure, as NAME:SCALE in pixels or NAME:auto (the scale follows the "
+                  "median residual, in rounds); :gnc at the end starts the last three wide and "
+                  "tightens them")
+      ->type_name("NAME[:SCALE|:auto][:gnc]")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Loss ignored;
+            return parse_loss(text, ignored);
+          },
+          ""))
       ->capture_default_str();
-  verb.add_option("--tolerance", a.tolerance,
-                  "stop when the relative decrease of the cost stays below this twice")
-      ->type_name("T")
-      ->check(number_in(0, most, true, "a number from 0 up"))
-      ->capture_default_str();
-  verb.add_option("--time-limit", a.time_limit_s,
-                  "stop after this many seconds of set-up and solving, write the best state and "
-                  "exit with 130")
-      ->type_name("SECONDS")
-      ->check(number_in(0, inf, false, "a number of seconds above 0"));
   verb.add_option(
           "--cheirality", a.cheirality,
           "observations behind their camera: formula (count them as the model does), reject "
@@ -143,6 +193,33 @@ void add_solve_options(CLI::App& verb, SolveArguments& a) {
             return parse_fix(text, ignored);
           },
           ""));
+}
+
+/// When it ends.
+void add_stopping_options(CLI::App& verb, SolveArguments& a) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const double most = std::numeric_limits<double>::max();
+  verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
+      ->type_name("N")
+      ->check(whole_number_from(0, "a whole number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--tolerance", a.tolerance,
+                  "stop when the relative decrease of the cost stays below this twice")
+      ->type_name("T")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--time-limit", a.time_limit_s,
+                  "stop after this many seconds of set-up and solving, write the best state and "
+                  "exit with 130")
+      ->type_name("SECONDS")
+      ->check(number_in(0, inf, false, "a number of seconds above 0"));
+}
+
+}  // namespace
+
+void add_solve_options(CLI::App& verb, SolveArguments& a) {
+  add_stopping_options(verb, a);
+  add_model_options(verb, a);
   add_solver_options(verb, a);
 }
 
@@ -151,6 +228,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   options.max_iterations = a.max_iterations;
   options.tolerance = a.tolerance;
   if (a.time_limit_s > 0) options.time_limit_s = a.time_limit_s;
+  parse_loss(a.loss, options.loss);
   options.cheirality = kCheiralities.at(a.cheirality);
   if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
   options.solver = kSolvers.at(a.solver);

@@ -15,6 +15,7 @@ struct SolveArguments {
   int max_iterations = SolveOptions().max_iterations;
   double tolerance = SolveOptions().tolerance;
   double time_limit_s = 0;  ///< 0: none
+  std::string loss = "none";
   std::string cheirality = "formula";
   std::string fix;
   std::string solver = "auto";
@@ -31,5 +32,8 @@ SolveOptions solve_options(const SolveArguments& arguments);
 
 /// "" or what is wrong with a --fix list.
 std::string parse_fix(const std::string& list, Fixed& out);
+
+/// "" or what is wrong with a --loss, NAME[:SCALE|:auto][:gnc].
+std::string parse_loss(const std::string& text, Loss& out);
 
 }  // namespace sheaf

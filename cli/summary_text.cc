@@ -16,12 +16,33 @@ std::string counts_text(const Problem& problem) {
                      problem.num_observations());
 }
 
+namespace {
+
+/// "cauchy, scale 0.932 px (sigma 3.51, 0.52, 0.366 px in 3 rounds)"
+std::string loss_text(const Summary& s) {
+  std::string rounds;
+  for (const LossRound& round : s.rounds)
+    rounds += fmt::format("{}{:.4g}", rounds.empty() ? "" : ", ",
+                          round.sigma_px > 0 ? round.sigma_px : round.scale_px);
+  std::string out = fmt::format("{}, scale {:.4g} px", to_string(s.loss), s.rounds.back().scale_px);
+  if (s.final_sigma_px > 0 || s.rounds.size() > 1)
+    out += fmt::format(" ({} {} px in {} round{})", s.final_sigma_px > 0 ? "sigma" : "scale",
+                       rounds, s.rounds.size(), s.rounds.size() == 1 ? "" : "s");
+  return out;
+}
+
+}  // namespace
+
 std::string summary_text(const Summary& s, double read_s) {
   const auto steps = s.iterations.empty() ? 0 : s.iterations.size() - 1;
   const auto rejected = std::count_if(s.iterations.begin(), s.iterations.end(),
                                       [](const Iteration& it) { return !it.accepted; });
   std::string out;
   out += fmt::format("cost        {:.9e} -> {:.9e}\n", s.initial_cost, s.final_cost);
+  if (s.loss != LossKind::none) {
+    out += fmt::format("loss        {}\n", loss_text(s));
+    out += fmt::format("plain cost  {:.9e} -> {:.9e}\n", s.initial_plain_cost, s.final_plain_cost);
+  }
   out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
   out += fmt::format("iterations  {}{}\n", steps,
                      rejected > 0 ? fmt::format(" ({} rejected)", rejected) : "");

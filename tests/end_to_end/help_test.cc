@@ -26,8 +26,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "demo") options.insert("--ply");
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--cheirality", "--fix", "--solver", "--memory-limit", "--initial-damping",
-                    "--inner-iterations", "--simd"});
+                    "--loss", "--cheirality", "--fix", "--solver", "--memory-limit",
+                    "--initial-damping", "--inner-iterations", "--simd"});
   return options;
 }
 

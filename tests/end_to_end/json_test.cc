@@ -146,6 +146,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
   EXPECT_EQ(s["options"], (json{{"max_iterations", 7},
                                 {"tolerance", 1e-12},
                                 {"time_limit_s", 60.0},
+                                {"loss", "none"},
                                 {"cheirality", "reject"},
                                 {"fix", {"k1", "pose=0"}},
                                 {"solver", "dense"},
