@@ -8,6 +8,7 @@
 //   lapack                        dense factorisation by LAPACK instead of Eigen
 //   mixed                         float factor with refinement
 //   eta=0.1  radius=1e4           forcing, first trust region radius
+//   huber=1.5 | soft_l1=1.5 | cauchy=1.5 | tukey=1.5    a loss with its scale in pixels
 //   inner                         inner iterations of the points, as sheaf takes
 //   nok2                          holds k2, as sheaf's --fix k2
 #include <ceres/ceres.h>
@@ -166,9 +167,19 @@ bool choose_solver(peer::Config& config, ceres::Solver::Options& options) {
   return true;
 }
 
+/// Null: none. The problem, which takes it, may have it for all its observations.
+ceres::LossFunction* choose_loss(peer::Config& config) {
+  if (const double c = config.value("huber", 0); c > 0) return new ceres::HuberLoss(c);
+  if (const double c = config.value("soft_l1", 0); c > 0) return new ceres::SoftLOneLoss(c);
+  if (const double c = config.value("cauchy", 0); c > 0) return new ceres::CauchyLoss(c);
+  if (const double c = config.value("tukey", 0); c > 0) return new ceres::TukeyLoss(c);
+  return nullptr;
+}
+
 /// What a run adds to Ceres' solver options.
 struct Words {
   bool analytic, hold_k2, inner;
+  ceres::LossFunction* loss;
 };
 
 void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
@@ -180,7 +191,7 @@ void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
       cost = new AnalyticProjection(o.u, o.v);
     else
       cost = new AutoProjection(new Projection{o.u, o.v});
-    problem.AddResidualBlock(cost, nullptr, &file.cameras[camera_size * o.camera],
+    problem.AddResidualBlock(cost, words.loss, &file.cameras[camera_size * o.camera],
                              &file.points[3 * o.point]);
   }
   std::vector<double*> blocks;
@@ -204,7 +215,8 @@ void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
 int solve(const peer::Arguments& arguments) {
   peer::Config config(arguments.config);
   ceres::Solver::Options options;
-  const Words words{config.has("analytic"), config.has("nok2"), config.has("inner")};
+  const Words words{config.has("analytic"), config.has("nok2"), config.has("inner"),
+                    choose_loss(config)};
   const bool known = choose_solver(config, options) && words.analytic != config.has("auto");
   if (!known || !config.unknown().empty()) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
