@@ -12,6 +12,7 @@
 #include <hwy/highway.h>
 
 #include "linear/eliminate-inl.h"
+#include "linear/float_product-inl.h"
 #include "linear/products-inl.h"
 #include "linear/schur_product-inl.h"
 #include "linear/trial-inl.h"
@@ -42,6 +43,10 @@ void product(const ProductInput& in, const Chunk& chunk, double* saved, double* 
   product_chunk(in, chunk, saved, y);
 }
 
+void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved, double* y) {
+  product_float_chunk(in, chunk, saved, y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   return square_sum_chunk(batches, cameras, points, chunk);
@@ -53,7 +58,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name, fused, &linearize, &diagonal, &pairs, &trial, &product, &square_sum, &count_behind};
+  return {name,   fused,    &linearize,     &diagonal,   &pairs,
+          &trial, &product, &product_float, &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -69,7 +75,8 @@ std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
 }
 
 std::size_t product_scratch_doubles(const Batches& batches) {
-  return std::size_t(20 * 8) * batches.longest_track;
+  // The wider of 16 fields of eight doubles and 31 of sixteen floats.
+  return std::size_t(31 * 8) * batches.longest_track;
 }
 
 Records records_in(double* scratch, const Chunks& chunks) {

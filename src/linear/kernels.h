@@ -93,6 +93,17 @@ struct ProductInput {
   const double* points;
   const double* factors;
 };
+/// The same in single precision. Lengths are what the scene's are after (X - origin) scale, so that
+/// neither the place of the scene nor its unit can take digits or leave the range of floats.
+struct FloatProductInput {
+  const Batches* batches;
+  const float* cameras;   ///< kFloatCameraRecord per image, in these lengths, with x as the step
+  const double* points;   ///< as they are
+  const double* factors;  ///< as they are
+  double origin[3], scale;
+};
+/// The 24 fields of a camera record, and 8 unused.
+constexpr std::size_t kFloatCameraRecord = 32;
 /// Per image: rho (3), phi (3), then sums of s, s n and s n^2 (s = p . e), 7 unused:
 ///   y_f = s0 + k1 s1 + k2 s2, y_k1 = f s1, y_k2 = f s2.
 constexpr std::size_t kProductRecord = 16;
@@ -108,7 +119,7 @@ constexpr std::size_t kTRecord = 32, kCRecord = 16;
 /// Doubles of scratch for any of these chunks, and the records laid out in it.
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
 Records records_in(double* scratch, const Chunks& chunks);
-/// Doubles of `saved` that a product needs.
+/// Doubles of `saved` that a product needs; as many bytes for one in floats.
 std::size_t product_scratch_doubles(const Batches& batches);
 
 /// One instruction set's hot kernels over one chunk. docs/math.md has the algebra.
@@ -126,6 +137,8 @@ struct Kernels {
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
   /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, kProductRecord doubles per image.
   void (*product)(const ProductInput&, const Chunk&, double* saved, double* y);
+  /// The same with all but the sums over images in single precision; y_rho per `scale`d length.
+  void (*product_float)(const FloatProductInput&, const Chunk&, float* saved, double* y);
   /// Sum |r|^2 of the chunk.
   double (*square_sum)(const Batches&, const double* cameras, const double* points, const Chunk&);
   /// Observations of the chunk whose point lies behind its camera (P.z > 0).

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "geometry/bal_camera.h"
 #include "linear/kernel_table.h"
@@ -376,6 +377,26 @@ void product(const ProductInput& in, const Chunk& chunk, double*, double* y) {
     for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l) product_point(in, g, l, y);
 }
 
+/// In double: points and factors as the scaled lengths have them, cameras as they were rounded.
+void product_float(const FloatProductInput& in, const Chunk& chunk, float*, double* y) {
+  std::size_t images = 0;
+  for (std::size_t b = 8 * chunk.first_batch; b < 8 * chunk.end_batch; ++b)
+    images = std::max(images, std::size_t{1} + in.batches->image[b]);
+  std::vector<double> cameras(kCameraRecord * images);
+  for (std::size_t i = 0; i < images; ++i)
+    std::copy_n(in.cameras + kFloatCameraRecord * i, kCameraRecord, &cameras[kCameraRecord * i]);
+  std::vector<double> points(kPointGroup * chunk.end_group);
+  std::vector<double> factors(kFactorGroup * chunk.end_group);
+  for (std::size_t i = kPointGroup * chunk.first_group; i < points.size(); ++i)
+    points[i] = (in.points[i] - in.origin[i / 8 % 3]) * in.scale;
+  for (std::size_t i = kFactorGroup * chunk.first_group; i < factors.size(); ++i) {
+    const std::size_t field = i / 8 % 12;
+    const bool inverse = field == 0 || field == 3 || field == 5;
+    factors[i] = in.factors[i] * (inverse ? in.scale : 1 / in.scale);
+  }
+  product({in.batches, cameras.data(), points.data(), factors.data()}, chunk, nullptr, y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   double sum = 0;
@@ -403,8 +424,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false,    &linearize,  &diagonal,    &pairs,
-                               &trial,      &product, &square_sum, &count_behind};
+  static const Kernels kernels{"reference", false,    &linearize,     &diagonal,   &pairs,
+                               &trial,      &product, &product_float, &square_sum, &count_behind};
   return kernels;
 }
 
