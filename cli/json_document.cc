@@ -40,6 +40,7 @@ Json options_json(const SolveArguments& a) {
           {"cheirality", a.cheirality},
           {"fix", fix},
           {"solver", a.solver},
+          {"precision", a.precision},
           {"memory_limit_bytes", a.memory_limit_bytes},
           {"initial_damping", a.initial_damping},
           {"inner_iterations", a.inner_iterations},

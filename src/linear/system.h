@@ -13,6 +13,7 @@ struct StepRequest {
   double damping = 0;    ///< lambda: J^T J + lambda diag(J^T J)
   double forcing = 0.1;  ///< how exactly an iterative solver solves (CameraSystem::forcing)
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
+  bool precise = false;  ///< solve in double, even where float would do for the way there
 };
 
 /// A damped Gauss-Newton step was computed (or not), points eliminated, from the held state.

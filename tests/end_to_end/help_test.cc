@@ -27,7 +27,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
                     "--cheirality", "--fix", "--solver", "--memory-limit", "--initial-damping",
-                    "--inner-iterations", "--simd"});
+                    "--inner-iterations", "--simd", "--precision"});
   return options;
 }
 

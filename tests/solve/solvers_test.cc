@@ -16,6 +16,7 @@ namespace {
 struct Case {
   CameraSolverKind solver;
   const char* name;
+  Precision precision = Precision::full;
 };
 
 class Solvers : public testing::TestWithParam<Case> {
@@ -31,9 +32,11 @@ class Solvers : public testing::TestWithParam<Case> {
     SolveOptions options = tight();
     options.fixed = fixed;
     options.solver = CameraSolverKind::dense;
+    options.precision = Precision::full;
     Problem reference = start;
     const double expected = solve(reference, options).final_cost;
     options.solver = GetParam().solver;
+    options.precision = GetParam().precision;
     Problem problem = start;
     const Summary s = solve(problem, options);
     EXPECT_TRUE(s.usable()) << s.words;
@@ -86,6 +89,7 @@ TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
   const Problem start = generate(scene).value().start;
   SolveOptions options;
   options.solver = GetParam().solver;
+  options.precision = GetParam().precision;
   options.max_iterations = 4;
   options.threads = 1;
   Problem expected = start;
@@ -99,12 +103,15 @@ TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Camera, Solvers,
-                         testing::Values(Case{CameraSolverKind::dense, "Dense"},
-                                         Case{CameraSolverKind::iterative, "Iterative"},
-                                         Case{CameraSolverKind::iterative_explicit, "Explicit"},
-                                         Case{CameraSolverKind::iterative_implicit, "Implicit"}),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Camera, Solvers,
+    testing::Values(Case{CameraSolverKind::dense, "Dense"},
+                    Case{CameraSolverKind::iterative, "Iterative"},
+                    Case{CameraSolverKind::iterative_explicit, "Explicit"},
+                    Case{CameraSolverKind::iterative_implicit, "Implicit"},
+                    Case{CameraSolverKind::iterative_explicit, "ExplicitMixed", Precision::mixed},
+                    Case{CameraSolverKind::iterative_implicit, "ImplicitMixed", Precision::mixed}),
+    [](const auto& info) { return info.param.name; });
 
 /// The scene with its first point seen `times` more, half a pixel apart.
 Problem with_long_track(int times) {
