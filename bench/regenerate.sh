@@ -85,7 +85,7 @@ if "$python" -c 'import gtsam' 2> /dev/null; then
   chmod +x "$peers/peer-gtsam"
 fi
 
-ceres_head="ceres-head:dense_schur-analytic,ceres-head:dense_schur-auto,ceres-head:dense_schur-analytic-radius=1e6,ceres-head:sparse_schur-analytic,ceres-head:iterative_explicit-analytic,ceres-head:iterative_implicit-analytic,ceres-head:iterative_implicit-analytic-jacobi"
+ceres_head="ceres-head:dense_schur-analytic,ceres-head:dense_schur-auto,ceres-head:dense_schur-analytic-radius=1e6,ceres-head:dense_schur-analytic-inner,ceres-head:dense_schur-analytic-inner-radius=1e6,ceres-head:sparse_schur-analytic,ceres-head:iterative_explicit-analytic,ceres-head:iterative_implicit-analytic,ceres-head:iterative_implicit-analytic-jacobi"
 ceres_old="ceres-2.1:dense_schur-auto,ceres-2.1:dense_schur-analytic,ceres-2.1:dense_schur-analytic-radius=1e6,ceres-2.1:iterative_explicit-analytic"
 g2o="g2o:eigen,g2o:eigen-lambda=1e-4,g2o:eigen-lambda=1e-2,g2o:eigen-lambda=1,g2o:cholmod-lambda=1e-2,g2o-omp:eigen-lambda=1e-2"
 rootba="rootba:schur-double,rootba:schur-float,rootba:sqrt-double,rootba:sqrt-float"

@@ -8,6 +8,7 @@
 //   lapack                        dense factorisation by LAPACK instead of Eigen
 //   mixed                         float factor with refinement
 //   eta=0.1  radius=1e4           forcing, first trust region radius
+//   inner                         inner iterations of the points, as sheaf takes
 //   nok2                          holds k2, as sheaf's --fix k2
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
@@ -165,12 +166,17 @@ bool choose_solver(peer::Config& config, ceres::Solver::Options& options) {
   return true;
 }
 
-void build(peer::BalFile& file, bool analytic, bool hold_k2, ceres::Problem& problem,
+/// What a run adds to Ceres' solver options.
+struct Words {
+  bool analytic, hold_k2, inner;
+};
+
+void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
            ceres::Solver::Options& options) {
   auto order = std::make_shared<ceres::ParameterBlockOrdering>();
   for (const auto& o : file.observations) {
     ceres::CostFunction* cost = nullptr;
-    if (analytic)
+    if (words.analytic)
       cost = new AnalyticProjection(o.u, o.v);
     else
       cost = new AutoProjection(new Projection{o.u, o.v});
@@ -182,7 +188,14 @@ void build(peer::BalFile& file, bool analytic, bool hold_k2, ceres::Problem& pro
   for (double* block : blocks)
     order->AddElementToGroup(block, problem.ParameterBlockSize(block) == 3 ? 0 : 1);
   options.linear_solver_ordering = order;
-  if (!hold_k2) return;
+  options.use_inner_iterations = words.inner;
+  if (words.inner) {
+    options.inner_iteration_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (double* block : blocks)
+      if (problem.ParameterBlockSize(block) == 3)
+        options.inner_iteration_ordering->AddElementToGroup(block, 0);
+  }
+  if (!words.hold_k2) return;
   auto* without_k2 = new ceres::SubsetManifold(camera_size, {8});
   for (double* block : blocks)
     if (problem.ParameterBlockSize(block) == camera_size) problem.SetManifold(block, without_k2);
@@ -191,8 +204,8 @@ void build(peer::BalFile& file, bool analytic, bool hold_k2, ceres::Problem& pro
 int solve(const peer::Arguments& arguments) {
   peer::Config config(arguments.config);
   ceres::Solver::Options options;
-  const bool analytic = config.has("analytic"), hold_k2 = config.has("nok2");
-  const bool known = choose_solver(config, options) && analytic != config.has("auto");
+  const Words words{config.has("analytic"), config.has("nok2"), config.has("inner")};
+  const bool known = choose_solver(config, options) && words.analytic != config.has("auto");
   if (!known || !config.unknown().empty()) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
     return 2;
@@ -203,7 +216,7 @@ int solve(const peer::Arguments& arguments) {
   peer::RunRecord record;
   record.start();
   ceres::Problem problem;
-  build(file, analytic, hold_k2, problem, options);
+  build(file, words, problem, options);
   record.setup_done();
   options.num_threads = arguments.threads;
   options.max_num_iterations = arguments.max_iterations;

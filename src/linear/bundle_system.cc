@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "linear/slices.h"
+
 namespace sheaf {
 
 namespace {
@@ -49,6 +51,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
   const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   camera_step_.allocate(padded);
+  make_coarse_space(plan.kind);
   switch (plan.kind) {
     case SolverKind::blocks:
       solver_ = make_block_solver(columns_, threads);
@@ -68,6 +71,14 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
                                plan.mixed, kernels, threads);
       break;
   }
+}
+
+void BundleSystem::make_coarse_space(SolverKind kind) {
+  if (rules_.held || (kind != SolverKind::explicit_cg && kind != SolverKind::implicit_cg)) return;
+  Clusters clusters = coarse_clusters(batches_, columns_);
+  if (clusters.count > 0)
+    coarse_ = std::make_unique<CoarseSpace>(batches_, columns_, std::move(clusters),
+                                            chunks_.slices.size() - 1, kernels_, threads_);
 }
 
 void BundleSystem::fill_state(const Problem& problem) {
@@ -107,6 +118,7 @@ Step BundleSystem::propose(const StepRequest& request) {
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
   const EliminateInput in{&batches_,      &chunks_,        cameras_.data(),
                           points_.data(), request.damping, rules_.held};
+  if (coarse_) coarse_->place(cameras_.data());
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[threads_.worker()];
@@ -116,31 +128,18 @@ Step BundleSystem::propose(const StepRequest& request) {
     double* diagonal = diagonal_.data() + s * diagonal_doubles;
     std::fill_n(tiles, tile_doubles, 0.0);
     std::fill_n(diagonal, diagonal_doubles, 0.0);
+    if (coarse_) coarse_->clear(s);
     outputs[s] = {factors_.data(), 0, 0, 0};
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
       kernels_.linearize(in, chunks_.chunks[c], records, outputs[s]);
       kernels_.diagonal(batches_, chunks_, chunks_.chunks[c], records, diagonal);
       kernels_.pairs(chunks_, chunks_.chunks[c], records, tiles);
+      if (coarse_) coarse_->add(s, chunks_.chunks[c], records);
     }
   });
-  add_slices();
+  add_slices(tiles_, slices, threads_);
+  add_slices(diagonal_, slices, threads_);
   return collect_step(request, outputs);
-}
-
-/// Adds the slices' sums into the first slice's, in order.
-void BundleSystem::add_slices() {
-  const std::size_t slices = chunks_.slices.size() - 1;
-  const auto add = [&](Buffer<double>& sums) {
-    constexpr std::size_t kBlock = 16384;
-    const std::size_t size = sums.size() / slices;
-    threads_.for_each((size + kBlock - 1) / kBlock, [&](std::size_t b) {
-      const std::size_t first = b * kBlock, end = std::min(size, first + kBlock);
-      for (std::size_t s = 1; s < slices; ++s)
-        for (std::size_t i = first; i < end; ++i) sums[i] += sums[s * size + i];
-    });
-  };
-  add(tiles_);
-  add(diagonal_);
 }
 
 Step BundleSystem::collect_step(const StepRequest& request,
@@ -169,11 +168,13 @@ Step BundleSystem::collect_step(const StepRequest& request,
 
 bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
   if (columns_.count == 0) return true;
+  const bool corrected = coarse_ && coarse_->factor(diagonal_.data(), damping_.data());
   const CameraSystem system{{&chunks_, tiles_.data(), diagonal_.data()},
                             &vectors_,
                             damping_.data(),
                             request.forcing,
                             request.cancelled,
+                            corrected ? coarse_.get() : nullptr,
                             request.precise};
   const CameraSolution solution = solver_->solve(system, camera_step_);
   step.linear_iterations = solution.iterations;
@@ -288,7 +289,7 @@ std::uint64_t BundleSystem::bytes() const {
   sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
          factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
   sum += scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
-  return sum + solver_->bytes();
+  return sum + solver_->bytes() + (coarse_ ? coarse_->bytes() : 0);
 }
 
 }  // namespace sheaf

@@ -8,6 +8,7 @@
 #include "geometry/rigid_motion.h"
 #include "linear/camera_solver.h"
 #include "linear/chunks.h"
+#include "linear/coarse_space.h"
 #include "linear/columns.h"
 #include "linear/kernels.h"
 #include "linear/plan.h"
@@ -48,7 +49,7 @@ class BundleSystem : public System {
   void fill_state(const Problem& problem);
   void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                            const double* parameters, double* records);
-  void add_slices();
+  void make_coarse_space(SolverKind kind);
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();
@@ -72,6 +73,7 @@ class BundleSystem : public System {
   std::vector<Buffer<double>> scratch_;  ///< one per thread
   CameraVectors vectors_;
   Buffer<double> damping_, camera_step_;
+  std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   std::unique_ptr<CameraSolver> solver_;
   double mean_square_ = 0;  ///< of a residual at the held state
   double point_decrease_ = 0;

@@ -32,6 +32,8 @@ struct CameraVectors {
   void gather(const ReducedSums& sums, const Columns& columns);
 };
 
+class CoarseSpace;
+
 /// (S + D) x = b, to solve exactly or, by an iterative solver, until the quadratic model's
 /// decrease per step falls below `forcing` of its mean.
 struct CameraSystem {
@@ -40,7 +42,8 @@ struct CameraSystem {
   const double* damping;  ///< D: one for each column
   double forcing = 0.1;
   const std::function<bool()>* cancelled = nullptr;
-  bool precise = false;  ///< in double, even by a mixed solver
+  const CoarseSpace* coarse = nullptr;  ///< factored; null: none
+  bool precise = false;                 ///< in double, even by a mixed solver
 };
 
 struct CameraSolution {

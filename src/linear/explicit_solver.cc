@@ -9,6 +9,7 @@
 #include "linear/block_rows.h"
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
+#include "linear/preconditioner.h"
 
 namespace sheaf {
 namespace {
@@ -169,7 +170,7 @@ class ExplicitSolver : public CameraSolver {
   template <class T>
   CameraSolution run(ExplicitOperator<T>& S, const CameraSystem& system, Buffer<double>& x) {
     S.assemble(system);
-    return cg_.run(S, blocks_, system, x);
+    return cg_.run(S, Preconditioner{blocks_, system.coarse}, system, x);
   }
 
   const Columns& columns_;

@@ -8,6 +8,7 @@
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
 #include "linear/float_operator.h"
+#include "linear/preconditioner.h"
 
 namespace sheaf {
 namespace {
@@ -90,7 +91,7 @@ class ImplicitSolver : public CameraSolver {
     const bool round = rounded_ && !system.precise;
     if (round) rounded_->prepare(system.vectors->squares.data());
     ImageOperator& S = round ? static_cast<ImageOperator&>(*rounded_) : operator_;
-    return cg_.run(S, blocks_, system, x);
+    return cg_.run(S, Preconditioner{blocks_, system.coarse}, system, x);
   }
   std::uint64_t bytes() const override {
     return operator_.bytes() + (rounded_ ? rounded_->bytes() : 0) + blocks_.bytes() + cg_.bytes();

@@ -11,6 +11,7 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "linear/coarse-inl.h"
 #include "linear/eliminate-inl.h"
 #include "linear/float_product-inl.h"
 #include "linear/products-inl.h"
@@ -33,6 +34,11 @@ void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
 
 void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, double* tiles) {
   pair_products(chunks, chunk, records, tiles);
+}
+
+void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
+            const CoarseInput& in, double* scratch, double* sums) {
+  coarse_products(batches, chunk, records, in, scratch, sums);
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
@@ -58,7 +64,7 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name,   fused,    &linearize,     &diagonal,   &pairs,
+  return {name,   fused,    &linearize,     &diagonal,   &pairs,       &coarse,
           &trial, &product, &product_float, &square_sum, &count_behind};
 }
 
@@ -77,6 +83,10 @@ std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
 std::size_t product_scratch_doubles(const Batches& batches) {
   // The wider of 16 fields of eight doubles and 31 of sixteen floats.
   return std::size_t(31 * 8) * batches.longest_track;
+}
+
+std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters) {
+  return (24 + 1) * coarse_scratch_clusters(batches, clusters);
 }
 
 Records records_in(double* scratch, const Chunks& chunks) {

@@ -116,11 +116,30 @@ struct Records {
 };
 constexpr std::size_t kTRecord = 32, kCRecord = 16;
 
+/// Modes of a cluster of the coarse space (linear/coarse_space.h).
+constexpr int kCoarseModes = 8;
+/// Z of an image: rows 0..6 of its nine (rho, phi, f) x modes, row-major.
+constexpr std::size_t kCoarseBasis = 56;
+/// A pair of clusters' sum: modes of the row's x modes of the column's, row-major.
+constexpr std::size_t kCoarseTile = 64;
+struct CoarseInput {
+  const double* basis;          ///< kCoarseBasis per image
+  const std::int32_t* cluster;  ///< of each image; -1: of none
+  const std::int32_t* tile;     ///< of a pair of clusters row >= column, by triangle
+  std::int32_t clusters;
+};
+
 /// Doubles of scratch for any of these chunks, and the records laid out in it.
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
 Records records_in(double* scratch, const Chunks& chunks);
 /// Doubles of `saved` that a product needs; as many bytes for one in floats.
 std::size_t product_scratch_doubles(const Batches& batches);
+/// Clusters that any one point can touch, and the doubles of scratch that coarse sums need.
+inline std::size_t coarse_scratch_clusters(const Batches& batches, std::int32_t clusters) {
+  const auto all = static_cast<std::uint32_t>(clusters);
+  return all < batches.longest_track ? all : batches.longest_track;
+}
+std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters);
 
 /// One instruction set's hot kernels over one chunk. docs/math.md has the algebra.
 struct Kernels {
@@ -133,6 +152,10 @@ struct Kernels {
   void (*diagonal)(const Batches&, const Chunks&, const Chunk&, const Records&, double* diagonal);
   /// Adds the records' products to the off-diagonal blocks of a slice.
   void (*pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
+  /// Adds Z^T of the records' products Z to the coarse sums of a slice: those of all pairs of
+  /// observations of one point, but none with itself. scratch: coarse_scratch_doubles.
+  void (*coarse)(const Batches&, const Chunk&, const Records&, const CoarseInput&, double* scratch,
+                 double* sums);
   /// Back-substitutes the chunk's points and evaluates the cost there; adds to `out`.
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
   /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, kProductRecord doubles per image.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "linear/block_rows.h"
+#include "linear/coarse_space.h"
 #include "linear/kernels.h"
 #include "linear/sparse_cholesky.h"
 
@@ -53,26 +54,44 @@ double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 /// observation for an implicit product, 12 ns a block for an explicit one, 200 ns to place a tile.
 constexpr double kPairNs = 4.5, kImplicitNs = 7, kBlockNs = 12, kPlaceNs = 200,
                  kDenseFlopsPerNs = 85;
-/// Conjugate gradient steps of a typical solve.
-constexpr double kTypicalIterations = 25;
+/// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
+/// collections.
+double iterations(const WorkCounts& c) { return c.clusters > 0 ? 15 : 25; }
+/// The coarse matrix: an observation's part in it, its factor's entries to substitute with.
+constexpr double kCoarseNs = 12, kCoarseEntryNs = 0.5;
+double coarse_seconds(const WorkCounts& c) {
+  const double n = kCoarseModes * static_cast<double>(c.clusters);
+  return seconds(kCoarseNs * static_cast<double>(c.observations) * (c.clusters > 0) +
+                 n * n * n / 3 / kDenseFlopsPerNs + iterations(c) * kCoarseEntryNs * n * n);
+}
+
+/// S's blocks as slices of sums: multiplied into, and 704 bytes of each cleared, added to and
+/// summed, which for many slices outweighs the products.
+constexpr double kSliceTileNs = 200;
+double forming_seconds(const WorkCounts& c) {
+  const int slices = count_slices(linearize_flops(c.batches, c.pairs), c.tiles, c.images);
+  return seconds(kPairNs * static_cast<double>(c.pairs) +
+                 kSliceTileNs * slices * static_cast<double>(c.tiles));
+}
 
 double dense_seconds(const WorkCounts& c) {
   const double n = static_cast<double>(c.columns);
-  return seconds(kPairNs * static_cast<double>(c.pairs) + n * n * n / 3 / kDenseFlopsPerNs);
+  return forming_seconds(c) + seconds(n * n * n / 3 / kDenseFlopsPerNs);
 }
 /// Measured. Panels are also cleared, filled and read twice to substitute.
 constexpr double kSparseFlopsPerNs = 65, kSparseEntryNs = 2.5;
 double sparse_seconds(const WorkCounts& c) {
-  return seconds(kPairNs * static_cast<double>(c.pairs) + c.sparse_flops / kSparseFlopsPerNs +
-                 kSparseEntryNs * static_cast<double>(c.sparse_doubles));
+  return forming_seconds(c) + seconds(c.sparse_flops / kSparseFlopsPerNs +
+                                      kSparseEntryNs * static_cast<double>(c.sparse_doubles));
 }
 double explicit_seconds(const WorkCounts& c) {
   const double blocks = 2 * static_cast<double>(c.tiles) + static_cast<double>(c.images);
-  return seconds(kPairNs * static_cast<double>(c.pairs) + kPlaceNs * static_cast<double>(c.tiles) +
-                 kTypicalIterations * kBlockNs * blocks);
+  return forming_seconds(c) + coarse_seconds(c) +
+         seconds(kPlaceNs * static_cast<double>(c.tiles) + iterations(c) * kBlockNs * blocks);
 }
 double implicit_seconds(const WorkCounts& c) {
-  return seconds(kTypicalIterations * kImplicitNs * static_cast<double>(c.observations));
+  return coarse_seconds(c) +
+         seconds(iterations(c) * kImplicitNs * static_cast<double>(c.observations));
 }
 
 std::string milliseconds(double s) {
@@ -114,6 +133,9 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
   c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles)
                                                  : std::min(all, c.pairs);
   count_sparse(columns, tiles, c);
+  const Clusters clusters = coarse_clusters(batches, columns);
+  c.clusters = static_cast<std::uint64_t>(clusters.count);
+  c.cluster_pairs = count_cluster_pairs(number_cluster_pairs(batches, clusters));
   return c;
 }
 
@@ -184,6 +206,8 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
            (plan.mixed ? slices * 8 * kProductRecord + 4 * kFloatCameraRecord : 0) * c.images;
   if (kind != SolverKind::dense && kind != SolverKind::sparse)
     sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
+  if ((kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg) && c.clusters > 0)
+    sum += CoarseSpace::bytes(c.images, c.clusters, c.cluster_pairs, slices);
   return sum;
 }
 

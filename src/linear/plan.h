@@ -24,6 +24,8 @@ struct WorkCounts {
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
   double sparse_flops = 0;
   std::uint64_t sparse_doubles = 0, sparse_bytes = 0;
+  /// Of the coarse space of the iterative solvers; 0: none.
+  std::uint64_t clusters = 0, cluster_pairs = 0;
   std::uint32_t longest_track = 0;
   bool images_couple = true;  ///< some free point or shared lens couples images
 

@@ -302,6 +302,35 @@ double depth(const double* cameras, std::uint32_t image, const Vector3<double>& 
   return multiply(o.R, X)[2] + o.t[2];
 }
 
+/// Every ordered pair of records of a point, as it stands in the text.
+void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
+            const CoarseInput& in, double*, double* sums) {
+  const auto projected = [&](std::size_t record, std::uint32_t image, int q, int m) {
+    double sum = 0;
+    for (int r = 0; r < 7; ++r)
+      sum += records.T[kTRecord * record + 8 * q + r] * in.basis[kCoarseBasis * image + 8 * r + m];
+    return sum;
+  };
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group& group = batches.groups[g];
+    for (std::uint32_t l = 0; l < group.lanes; ++l)
+      for (std::uint32_t a = 0; a < group.track; ++a)
+        for (std::uint32_t b = 0; b < group.track; ++b) {
+          const std::uint32_t image_a = batches.image[8 * (group.first_batch + a) + l];
+          const std::uint32_t image_b = batches.image[8 * (group.first_batch + b) + l];
+          const std::int32_t row = in.cluster[image_a], column = in.cluster[image_b];
+          if (a == b || column < 0 || row < column) continue;
+          double* tile = sums + kCoarseTile * in.tile[std::size_t(row) * (row + 1) / 2 + column];
+          const std::size_t first = 8 * (group.first_batch - chunk.first_batch) + l;
+          for (int m = 0; m < 8; ++m)
+            for (int n = 0; n < 8; ++n)
+              for (int q = 0; q < 3; ++q)
+                tile[8 * m + n] += projected(first + 8 * a, image_a, q, m) *
+                                   projected(first + 8 * b, image_b, q, n);
+        }
+  }
+}
+
 void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialOutput& out) {
   const Batches& batches = *in.batches;
   const Batches::Group& group = batches.groups[g];
@@ -424,8 +453,9 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false,    &linearize,     &diagonal,   &pairs,
-                               &trial,      &product, &product_float, &square_sum, &count_behind};
+  static const Kernels kernels{"reference",    false,       &linearize,   &diagonal,
+                               &pairs,         &coarse,     &trial,       &product,
+                               &product_float, &square_sum, &count_behind};
   return kernels;
 }
 

@@ -113,6 +113,73 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{CameraSolverKind::iterative_implicit, "ImplicitMixed", Precision::mixed}),
     [](const auto& info) { return info.param.name; });
 
+/// Long enough for a coarse space of some twenty clusters.
+Problem street() {
+  FamilyOptions options;
+  options.family = SceneFamily::street;
+  options.images = 160;
+  options.points = 9000;
+  options.observations = 38000;
+  return generate(options).value().start;
+}
+
+class LongStreet : public testing::TestWithParam<Case> {};
+
+TEST_P(LongStreet, TakesFewIterationsAndTheSameSteps) {
+  const Problem start = street();
+  SolveOptions options;
+  options.max_iterations = 7;
+  options.solver = CameraSolverKind::dense;
+  Problem reference = start;
+  const double expected = solve(reference, options).final_cost;
+  options.solver = GetParam().solver;
+  Problem problem = start;
+  const Summary s = solve(problem, options);
+  EXPECT_NEAR(s.final_cost, expected, 2e-3 * expected);
+  int iterations = 0;
+  for (const Iteration& it : s.iterations) iterations += it.linear_iterations;
+  // With the diagonal blocks alone 7 steps of a street of 138 images took 427.
+  EXPECT_LE(iterations, 130);
+}
+
+TEST_P(LongStreet, HoldsPosesAndSharesLenses) {
+  Problem problem = street();
+  for (std::size_t i = 0; i < problem.num_images(); ++i)
+    problem.image_camera[i] = static_cast<std::uint32_t>(i < 100 ? i % 3 : i);
+  SolveOptions options;
+  options.max_iterations = 6;
+  for (std::uint32_t i = 40; i < 80; ++i) options.fixed.pose_ids.push_back(i);
+  options.solver = CameraSolverKind::dense;
+  Problem reference = problem;
+  const double expected = solve(reference, options).final_cost;
+  options.solver = GetParam().solver;
+  const Problem start = problem;
+  EXPECT_NEAR(solve(problem, options).final_cost, expected, 5e-3 * expected);
+  for (std::uint32_t i = 40; i < 80; ++i)
+    EXPECT_EQ(problem.poses[i].translation, start.poses[i].translation) << i;
+}
+
+TEST_P(LongStreet, GivesTheSameBitsOnAnyThreads) {
+  const Problem start = street();
+  SolveOptions options;
+  options.solver = GetParam().solver;
+  options.max_iterations = 3;
+  options.threads = 1;
+  Problem expected = start;
+  const Summary reference = solve(expected, options);
+  for (int threads : {2, 5}) {
+    options.threads = threads;
+    Problem problem = start;
+    EXPECT_EQ(solve(problem, options).final_cost, reference.final_cost) << threads << " threads";
+    EXPECT_EQ(problem.points, expected.points) << threads << " threads";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Camera, LongStreet,
+                         testing::Values(Case{CameraSolverKind::iterative_explicit, "Explicit"},
+                                         Case{CameraSolverKind::iterative_implicit, "Implicit"}),
+                         [](const auto& info) { return info.param.name; });
+
 /// The scene with its first point seen `times` more, half a pixel apart.
 Problem with_long_track(int times) {
   Problem problem = small_scene().start;
