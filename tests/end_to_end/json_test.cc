@@ -42,10 +42,13 @@ bool has_keys(const json& value, const std::set<std::string>& keys) {
 
 bool is_list(const json& value) { return has_keys(value, {"count", "first"}); }
 
-bool is_errors(const json& value) {
-  if (!has_keys(value, {"aligned", "scale", "rotation_error_rad", "translation_error",
-                        "center_error", "point_error"}))
-    return false;
+// Exactly an object of errors, or with other keys beside.
+bool is_errors(const json& value, bool and_more = false) {
+  const std::set<std::string> keys = {"aligned",           "scale",        "rotation_error_rad",
+                                      "translation_error", "center_error", "point_error"};
+  if (!and_more && !has_keys(value, keys)) return false;
+  for (const std::string& key : keys)
+    if (!value.contains(key)) return false;
   for (const char* kind :
        {"rotation_error_rad", "translation_error", "center_error", "point_error"})
     if (!has_keys(value[kind], {"mean", "median", "rms", "max"})) return false;
@@ -109,6 +112,13 @@ TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
 }
 
 TEST_F(JsonTest, GenerateHasTheDocumentedKeys) { expect_documented("generate", {"generate"}); }
+
+TEST_F(JsonTest, PerturbHasTheDocumentedKeys) {
+  ASSERT_EQ(
+      run({"perturb", "in.txt", "o.txt", "--json", "perturb.json", "--outliers", "0.1"}).exit_code,
+      0);
+  expect_documented("perturb", {kShared, "perturb"});
+}
 
 TEST_F(JsonTest, DemoHasTheDocumentedKeys) {
   ASSERT_EQ(run({"demo", "--points", "400", "--json", "demo.json"}).exit_code, 0);
