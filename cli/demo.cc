@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "errors_document.h"
 #include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
@@ -57,22 +58,6 @@ void tell_end(const SceneOptions& scene, const Problem& problem, const Summary& 
   line("points", before.point_error.median, after.point_error.median);
   fmt::print("\nThe residual should come down to the noise: {:.4g} px expected, {:.4g} px found.\n",
              expected_rms_px(problem, scene.pixel_noise_px), summary.final_rms_px);
-}
-
-Json error_json(const ErrorStatistics& e) {
-  return {{"mean", number(e.mean)},
-          {"median", number(e.median)},
-          {"rms", number(e.rms)},
-          {"max", number(e.max)}};
-}
-
-Json errors_json(const StateErrors& errors) {
-  return {{"aligned", errors.aligned},
-          {"scale", number(errors.scale)},
-          {"rotation_error_rad", error_json(errors.rotation_error_rad)},
-          {"translation_error", error_json(errors.translation_error)},
-          {"center_error", error_json(errors.center_error)},
-          {"point_error", error_json(errors.point_error)}};
 }
 
 Json generated_input(const Problem& problem) {

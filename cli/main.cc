@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
   sheaf::add_info(app, exit_code);
   sheaf::add_convert(app, exit_code);
   sheaf::add_perturb(app, exit_code);
+  sheaf::add_evaluate(app, exit_code);
   sheaf::add_generate(app, exit_code);
   sheaf::add_demo(app, exit_code);
   try {

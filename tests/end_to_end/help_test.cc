@@ -24,6 +24,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
   if (verb == "demo") options.insert("--ply");
+  if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
                     "--outliers", "--outlier-size", "--seed", "--protocol", "--normalize",
@@ -79,14 +80,15 @@ TEST_P(Help, ExampleRuns) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
-                         testing::Values("solve", "info", "convert", "perturb", "generate", "demo"),
+                         testing::Values("solve", "info", "convert", "perturb", "evaluate",
+                                         "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "convert", "perturb", "generate", "demo"})
+  for (const char* verb : {"solve", "info", "convert", "perturb", "evaluate", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

@@ -120,6 +120,12 @@ TEST_F(JsonTest, PerturbHasTheDocumentedKeys) {
   expect_documented("perturb", {kShared, "perturb"});
 }
 
+TEST_F(JsonTest, EvaluateHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"evaluate", "in.txt", "in.txt", "--json", "evaluate.json"}).exit_code, 0);
+  expect_documented("evaluate", {"evaluate"});
+  EXPECT_TRUE(is_errors(json_of(folder_ / "evaluate.json"), true));
+}
+
 TEST_F(JsonTest, DemoHasTheDocumentedKeys) {
   ASSERT_EQ(run({"demo", "--points", "400", "--json", "demo.json"}).exit_code, 0);
   expect_documented("demo", {kShared, "solve", "demo"});
