@@ -24,6 +24,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
   if (verb == "demo") options.insert("--ply");
+  if (verb == "info") options.insert("--pattern");
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",

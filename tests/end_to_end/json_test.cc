@@ -100,8 +100,11 @@ TEST_F(JsonTest, SolveHasTheDocumentedKeys) {
 }
 
 TEST_F(JsonTest, InfoHasTheDocumentedKeys) {
-  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json", "--pattern", "p.png"}).exit_code, 0);
   expect_documented("info", {kShared, "info"});
+  EXPECT_EQ(contents_of(folder_ / "p.png").rfind("\x89PNG", 0), 0u);
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
+  EXPECT_TRUE(json_of(folder_ / "info.json")["pattern"].is_null());
 }
 
 TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
