@@ -90,7 +90,9 @@ int run(const Arguments& arguments) {
     return true;
   };
   interrupt.begin_solve();
+  const double cpu_before_s = processor_seconds();
   const Summary summary = try_solve(problem, options).value();
+  const double cpu_s = processor_seconds() - cpu_before_s;
   interrupt.begin_write();
 
   const StateErrors before = compare_states(scene.start, scene.truth, true).value();
@@ -105,6 +107,7 @@ int run(const Arguments& arguments) {
                        .before = evaluate(scene.start),
                        .after = evaluate(problem),
                        .read_s = generate_s,
+                       .cpu_s = cpu_s,
                        .write_s = writing.seconds(),
                        .total_s = total.seconds()};
     Json document = solve_json(record, summary, problem);

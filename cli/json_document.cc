@@ -125,6 +125,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
            {{"read_s", record.read_s},
             {"setup_s", s.setup_s},
             {"solve_s", s.solve_s},
+            {"cpu_s", record.cpu_s},
             {"write_s", record.write_s},
             {"total_s", record.total_s}}},
           {"plain_cost",

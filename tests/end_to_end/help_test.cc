@@ -24,6 +24,9 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
   if (verb == "demo") options.insert("--ply");
+  if (verb == "compare")
+    options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
+                    "--time-to", "--runs", "--plot"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
@@ -89,7 +92,8 @@ TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "convert", "perturb", "evaluate", "generate", "demo"})
+  for (const char* verb :
+       {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

@@ -129,6 +129,15 @@ TEST_F(JsonTest, EvaluateHasTheDocumentedKeys) {
   EXPECT_TRUE(is_errors(json_of(folder_ / "evaluate.json"), true));
 }
 
+TEST_F(JsonTest, CompareHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"compare", "in.txt", "--json", "compare.json", "--solvers", "sheaf,nobody",
+                 "--reference", "in.txt"})
+                .exit_code,
+            0);
+  expect_documented("compare", {"compare"});
+  EXPECT_TRUE(is_errors(json_of(folder_ / "compare.json")["runs"][0]["errors"]));
+}
+
 TEST_F(JsonTest, DemoHasTheDocumentedKeys) {
   ASSERT_EQ(run({"demo", "--points", "400", "--json", "demo.json"}).exit_code, 0);
   expect_documented("demo", {kShared, "solve", "demo"});
