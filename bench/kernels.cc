@@ -183,7 +183,7 @@ void cholesky(benchmark::State& state, const Kernels* kernels) {
 
 BundleSystem make_system(const Problem& problem, const Kernels& kernels, Threads& threads) {
   return BundleSystem(problem, arrange(problem), number_columns(problem, {}),
-                      PointRules{false, false, 3}, SolverKind::dense, kernels, threads);
+                      PointRules{false, false, 3}, {SolverKind::dense}, kernels, threads);
 }
 
 void setup(benchmark::State& state, const Kernels* kernels) {

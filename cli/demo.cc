@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "errors_document.h"
 #include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
@@ -59,22 +60,6 @@ void tell_end(const SceneOptions& scene, const Problem& problem, const Summary& 
              expected_rms_px(problem, scene.pixel_noise_px), summary.final_rms_px);
 }
 
-Json error_json(const ErrorStatistics& e) {
-  return {{"mean", number(e.mean)},
-          {"median", number(e.median)},
-          {"rms", number(e.rms)},
-          {"max", number(e.max)}};
-}
-
-Json errors_json(const StateErrors& errors) {
-  return {{"aligned", errors.aligned},
-          {"scale", number(errors.scale)},
-          {"rotation_error_rad", error_json(errors.rotation_error_rad)},
-          {"translation_error", error_json(errors.translation_error)},
-          {"center_error", error_json(errors.center_error)},
-          {"point_error", error_json(errors.point_error)}};
-}
-
 Json generated_input(const Problem& problem) {
   Json input = {{"path", nullptr},
                 {"format", "generated"},
@@ -105,7 +90,9 @@ int run(const Arguments& arguments) {
     return true;
   };
   interrupt.begin_solve();
+  const double cpu_before_s = processor_seconds();
   const Summary summary = try_solve(problem, options).value();
+  const double cpu_s = processor_seconds() - cpu_before_s;
   interrupt.begin_write();
 
   const StateErrors before = compare_states(scene.start, scene.truth, true).value();
@@ -120,6 +107,7 @@ int run(const Arguments& arguments) {
                        .before = evaluate(scene.start),
                        .after = evaluate(problem),
                        .read_s = generate_s,
+                       .cpu_s = cpu_s,
                        .write_s = writing.seconds(),
                        .total_s = total.seconds()};
     Json document = solve_json(record, summary, problem);

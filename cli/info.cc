@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <string>
 
+#include "image/png.h"
+#include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
+#include "io/output_file.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
@@ -20,8 +24,39 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
-  std::string in;
+  std::string in, pattern;
 };
+
+// What --pattern draws, in numbers; null without it.
+Json pattern_json(const std::string& path, const PatternCounts& c) {
+  if (path.empty()) return {};
+  return {{"path", path},
+          {"links", c.links},
+          {"fill", number(c.fill)},
+          {"strongest_link", c.strongest_link},
+          {"jacobian_rows", c.jacobian_rows},
+          {"jacobian_columns", c.jacobian_columns},
+          {"jacobian_nonzeros", c.jacobian_nonzeros},
+          {"hessian_nonzeros", c.hessian_nonzeros},
+          {"reduced_columns", c.reduced_columns}};
+}
+
+PatternCounts write_pattern(const Problem& problem, const std::string& name,
+                            const std::string& path) {
+  const PatternFigure figure =
+      draw_patterns(problem,
+                    std::filesystem::path(name).filename().string() + ": " + counts_text(problem))
+          .value();
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(encode_png(figure.image).value());
+  file.value().commit().value();
+  const PatternCounts& c = figure.counts;
+  fmt::print("network     {} pairs of images with points in common, {:.3g}% of all\n", c.links,
+             100 * c.fill);
+  fmt::print("patterns    {}\n", path);
+  return c;
+}
 
 // One line for each of 0 ... 9 observations, then for each doubling: 10-19, 20-39, ...
 void print_histogram(const Statistics& statistics) {
@@ -73,11 +108,14 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
 int run(const Arguments& arguments) {
   const Timer total;
   const std::string& json = arguments.common.json;
-  check_outputs({{"--json", json}});
+  check_outputs({{"--pattern", arguments.pattern}, {"--json", json}});
   const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Statistics statistics = statistics_of(input.problem);
   const Evaluation evaluation = evaluate(input.problem);
   print(arguments.in, input, statistics, evaluation);
+  PatternCounts pattern;
+  if (!arguments.pattern.empty())
+    pattern = write_pattern(input.problem, arguments.in, arguments.pattern);
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION}, {"input", input_json(arguments.in, input)}};
   document.update(statistics_json(statistics));
@@ -85,6 +123,7 @@ int run(const Arguments& arguments) {
   document["rms_px"] = number(evaluation.rms_px);
   document["behind_camera"] = observations_json(evaluation.behind, input.problem);
   document["not_finite"] = observations_json(evaluation.not_finite, input.problem);
+  document["pattern"] = pattern_json(arguments.pattern, pattern);
   document["memory"] = {{"problem_bytes", size_bytes(input.problem)},
                         {"peak_bytes", peak_resident_bytes()}};
   document["time"] = {{"read_s", input.read_s}, {"total_s", total.seconds()}};
@@ -101,8 +140,12 @@ void add_info(CLI::App& app, int& exit_code) {
   verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
       ->type_name("FILE")
       ->required();
+  verb.add_option("--pattern", arguments->pattern,
+                  "also draw the network of images and the patterns of Jacobian, Hessian and "
+                  "reduced camera matrix, as PNG")
+      ->type_name("FILE");
   add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf info problem.txt --json info.json");
+  verb.footer("Example:\n  sheaf info problem.txt --json info.json --pattern pattern.png");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -34,7 +34,7 @@ struct SolveRecord {
   Json input;
   SolveArguments arguments;
   Evaluation before, after;  ///< by independent code
-  double read_s = 0, write_s = 0, total_s = 0;
+  double read_s = 0, cpu_s = 0, write_s = 0, total_s = 0;
 };
 Json solve_json(const SolveRecord& record, const Summary& summary, const Problem& problem);
 

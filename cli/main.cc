@@ -47,6 +47,9 @@ int main(int argc, char** argv) {
   sheaf::add_solve(app, exit_code);
   sheaf::add_info(app, exit_code);
   sheaf::add_convert(app, exit_code);
+  sheaf::add_perturb(app, exit_code);
+  sheaf::add_evaluate(app, exit_code);
+  sheaf::add_compare(app, exit_code);
   sheaf::add_generate(app, exit_code);
   sheaf::add_demo(app, exit_code);
   try {

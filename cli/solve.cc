@@ -83,7 +83,9 @@ int run(const Arguments& arguments) {
     return true;
   };
   interrupt.begin_solve();
+  const double cpu_before_s = processor_seconds();
   const Summary summary = try_solve(problem, options).value();
+  record.cpu_s = processor_seconds() - cpu_before_s;
   interrupt.begin_write();
 
   const Timer writing;

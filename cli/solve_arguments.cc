@@ -28,6 +28,8 @@ const std::map<std::string, CameraSolverKind> kSolvers = {
     {"iterative", CameraSolverKind::iterative},
     {"iterative-explicit", CameraSolverKind::iterative_explicit},
     {"iterative-implicit", CameraSolverKind::iterative_implicit}};
+const std::map<std::string, Precision> kPrecisions = {
+    {"auto", Precision::automatic}, {"double", Precision::full}, {"mixed", Precision::mixed}};
 const std::map<std::string, Simd> kSimds = {{"best", Simd::best},
                                             {"scalar", Simd::scalar},
                                             {"sse4", Simd::sse4},
@@ -59,6 +61,7 @@ bool parse_fix_item(std::string_view item, Fixed& out) {
   return false;
 }
 
+/// How the camera system is solved, in what, and within which memory.
 void add_solver_options(CLI::App& verb, SolveArguments& a) {
   const double most = std::numeric_limits<double>::max();
   verb.add_option("--solver", a.solver,
@@ -69,6 +72,13 @@ void add_solver_options(CLI::App& verb, SolveArguments& a) {
       ->type_name("NAME")
       ->check(one_of(
           {"auto", "dense", "sparse", "iterative", "iterative-explicit", "iterative-implicit"}))
+      ->capture_default_str();
+  verb.add_option("--precision", a.precision,
+                  "inside the solver of the camera system: double, mixed (float where the solver "
+                  "can; state, gradient and costs stay double) or auto (mixed where it is quicker "
+                  "and ends where double does)")
+      ->type_name("NAME")
+      ->check(one_of({"auto", "double", "mixed"}))
       ->capture_default_str();
   verb.add_option("--memory-limit", a.memory_limit_bytes,
                   "take a leaner solver, or refuse (exit 5), rather than exceed this many bytes; "
@@ -232,6 +242,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   options.cheirality = kCheiralities.at(a.cheirality);
   if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
   options.solver = kSolvers.at(a.solver);
+  options.precision = kPrecisions.at(a.precision);
   options.memory_limit_bytes = a.memory_limit_bytes;
   options.initial_damping = a.initial_damping;
   options.inner_iterations = a.inner_iterations;

@@ -19,6 +19,7 @@ struct SolveArguments {
   std::string cheirality = "formula";
   std::string fix;
   std::string solver = "auto";
+  std::string precision = "auto";
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none
   double initial_damping = 0;
   int inner_iterations = SolveOptions().inner_iterations;

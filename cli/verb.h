@@ -19,6 +19,9 @@ void add_common_options(CLI::App& verb, CommonOptions& options);
 void add_solve(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
+void add_perturb(CLI::App& app, int& exit_code);
+void add_evaluate(CLI::App& app, int& exit_code);
+void add_compare(CLI::App& app, int& exit_code);
 void add_generate(CLI::App& app, int& exit_code);
 void add_demo(CLI::App& app, int& exit_code);
 

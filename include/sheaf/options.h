@@ -34,6 +34,13 @@ enum class CameraSolverKind {
   iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed
 };
 
+/// In what the camera system is solved. State, residuals, gradient and costs are always double.
+enum class Precision {
+  automatic,  ///< whichever is quicker, where mixed ends where double ends
+  full,       ///< double throughout
+  mixed,      ///< float inside the linear solver, where it has such a variant
+};
+
 struct SolveOptions {
   int max_iterations = 50;  ///< trust region steps tried, rejected ones included
   double tolerance = 1e-8;  ///< stop when the relative cost decrease stays below this twice
@@ -44,6 +51,7 @@ struct SolveOptions {
   Cheirality cheirality = Cheirality::formula;
   Fixed fixed{};
   CameraSolverKind solver = CameraSolverKind::automatic;
+  Precision precision = Precision::automatic;
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   double initial_damping = 0;            ///< 0: the default rule
   /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras

@@ -92,4 +92,59 @@ Result<StreamedScene> stream(const FamilyOptions& options, SceneState state, Sce
 /// Both states in memory.
 Result<Scene> generate(const FamilyOptions& options);
 
+/// What the sigmas of a NoiseOptions move, and in which order. w: angle-axis, C: camera centre.
+enum class NoiseProtocol : std::uint8_t {
+  sheaf,   ///< R <- exp(phi) R and C <- C + d, then t <- t + e: a turn leaves the centre in place
+  ceres,   ///< the BAL example of Ceres Solver: w <- w + phi with C held, then t <- t + e
+  rootba,  ///< rootba: C <- C + d, then R <- exp(phi) R with t held
+};
+
+/// Standard deviations of independent normal errors, in units of the file; 0 draws nothing. Each
+/// kind has a stream of its own, so that none of them changes what the others draw, and scaling a
+/// sigma scales its errors. The same options give the same bytes on every machine.
+struct NoiseOptions {
+  NoiseProtocol protocol = NoiseProtocol::sheaf;
+  double rotation_rad = 0;                      ///< each component of phi
+  double translation = 0;                       ///< each component of t, scene units
+  double center = 0;                            ///< each component of C, scene units
+  double point = 0;                             ///< each coordinate, scene units
+  std::array<double, 3> intrinsics{};           ///< of f (px), k1, k2
+  std::array<double, 3> intrinsics_relative{};  ///< likewise, as parts of the parameter's size
+  double pixel_px = 0;                          ///< each component of a measurement
+  double outliers = 0;      ///< fraction of the measurements that are moved by outlier_px
+  double outlier_px = 50;   ///< how far, in a random direction
+  double normalize_to = 0;  ///< first `normalize` to this size; 0: leave the scene as it is
+  double least_depth = 0;   ///< at last leave out what is nearer to its camera, or behind it;
+                            ///< 0: keep all. Points that are left with one observation go too
+  std::uint64_t seed = 1;
+};
+
+/// What a protocol was published with: sigmas, normalisation, filter and seed.
+NoiseOptions published_noise(NoiseProtocol protocol);
+
+/// X -> scale (X - center).
+struct Normalization {
+  std::array<double, 3> center{0, 0, 0};
+  double scale = 1;
+};
+
+struct NoiseRecord {
+  Normalization normalization;
+  std::vector<std::uint64_t> outliers;     ///< observations that were moved, ascending
+  std::uint64_t dropped_observations = 0;  ///< by least_depth
+  std::uint64_t dropped_points = 0;
+};
+
+/// Disturbs a problem as NoiseOptions say: normalisation, images, lenses, points, pixels, outliers,
+/// depth filter. Outliers are the observations of least rank in a random order: those of a smaller
+/// fraction are among those of a larger one, and move alike. Errors: ErrorCode::usage for options
+/// that are negative or not finite, or not of the protocol; the problem is then as it was.
+Result<NoiseRecord> perturb(Problem& problem, const NoiseOptions& options);
+
+/// Moves the scene so that the median of each coordinate of the points is 0, and scales it so that
+/// the median of |X| + |Y| + |Z| is `size`: the normalisation that Ceres' BAL example and rootba
+/// share (with 100). Projections stay as they are. Errors: ErrorCode::usage when half the points
+/// are one.
+Result<Normalization> normalize(Problem& problem, double size = 100);
+
 }  // namespace sheaf

@@ -65,10 +65,10 @@ struct Summary {
   std::vector<LossRound> rounds;  ///< without a loss one
   double final_sigma_px = 0;      ///< estimated at the end, for an automatic scale
 
-  std::string solver;         ///< "dense", ...
-  std::string solver_reason;  ///< one line: why this one
-  std::string precision = "double";
-  std::string simd;  ///< instruction set used
+  std::string solver;                ///< "dense", ...
+  std::string solver_reason;         ///< one line: why this one
+  std::string precision = "double";  ///< or "mixed": float inside the linear solver
+  std::string simd;                  ///< instruction set used
   int threads = 1;
   std::uint64_t forecast_bytes = 0;  ///< predicted peak resident size of the process
 

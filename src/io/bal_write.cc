@@ -1,29 +1,16 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <array>
-#include <bit>
-
 #include "geometry/rotation.h"
 #include "io/bal.h"
 #include "io/text_buffer.h"
+#include "scene/stated_rotation.h"
 
 namespace sheaf {
 namespace {
 
-bool same_bits(const Quaternion<double>& a, const Quaternion<double>& b) {
-  for (std::size_t k = 0; k < 4; ++k)
-    if (std::bit_cast<std::uint64_t>(a[k]) != std::bit_cast<std::uint64_t>(b[k])) return false;
-  return true;
-}
-
 Vector3<double> rotation_of(const Problem& problem, std::size_t image) {
-  const Quaternion<double>& q = problem.poses[image].rotation;
-  if (!problem.bal_angle_axis.empty()) {
-    const double* a = &problem.bal_angle_axis[3 * image];
-    const Vector3<double> stated{a[0], a[1], a[2]};
-    if (same_bits(quaternion_from_angle_axis(stated), q)) return stated;
-  }
-  return angle_axis_from_quaternion(q);
+  if (const auto stated = stated_rotation(problem, image)) return *stated;
+  return angle_axis_from_quaternion(problem.poses[image].rotation);
 }
 
 }  // namespace

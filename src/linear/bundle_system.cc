@@ -33,14 +33,14 @@ ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_tr
 }  // namespace
 
 BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns columns,
-                           const PointRules& rules, SolverKind kind, const Kernels& kernels,
+                           const PointRules& rules, const Plan& plan, const Kernels& kernels,
                            Threads& threads)
     : rules_(rules),
       kernels_(kernels),
       threads_(threads),
       batches_(std::move(batches)),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              lists_for(kind, rules.held, batches_.longest_track))),
+                              lists_for(plan.kind, rules.held, batches_.longest_track))),
       columns_(std::move(columns)) {
   fill_state(problem);
   const std::size_t slices = chunks_.slices.size() - 1;
@@ -51,8 +51,8 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
   const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   camera_step_.allocate(padded);
-  make_coarse_space(kind);
-  switch (kind) {
+  make_coarse_space(plan.kind);
+  switch (plan.kind) {
     case SolverKind::blocks:
       solver_ = make_block_solver(columns_, threads);
       break;
@@ -63,12 +63,12 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       solver_ = make_sparse_solver(columns_, chunks_, kernels, threads);
       break;
     case SolverKind::explicit_cg:
-      solver_ = make_explicit_solver(columns_, chunks_, threads);
+      solver_ = make_explicit_solver(columns_, chunks_, plan.mixed, kernels, threads);
       break;
     case SolverKind::implicit_cg:
       solver_ = make_implicit_solver(
-          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_}, kernels,
-          threads);
+          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_}, plan.mixed,
+          kernels, threads);
       break;
   }
 }
@@ -179,7 +179,8 @@ bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
                             damping_.data(),
                             request.forcing,
                             request.cancelled,
-                            corrected ? coarse_.get() : nullptr};
+                            corrected ? coarse_.get() : nullptr,
+                            request.precise};
   const CameraSolution solution = solver_->solve(system, camera_step_);
   step.linear_iterations = solution.iterations;
   return solution.solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,

@@ -35,7 +35,7 @@ class BundleSystem : public System {
  public:
   /// Throws std::bad_alloc.
   BundleSystem(const Problem& problem, Batches batches, Columns columns, const PointRules& rules,
-               SolverKind kind, const Kernels& kernels, Threads& threads);
+               const Plan& plan, const Kernels& kernels, Threads& threads);
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;

@@ -43,6 +43,7 @@ struct CameraSystem {
   double forcing = 0.1;
   const std::function<bool()>* cancelled = nullptr;
   const CoarseSpace* coarse = nullptr;  ///< factored; null: none
+  bool precise = false;                 ///< in double, even by a mixed solver
 };
 
 struct CameraSolution {
@@ -70,8 +71,10 @@ std::unique_ptr<CameraSolver> make_sparse_solver(const Columns& columns, const C
 /// One small system for each image: exact where images do not couple (points held, own lenses).
 std::unique_ptr<CameraSolver> make_block_solver(const Columns& columns, Threads& threads);
 
-/// Conjugate gradients on S formed as blocks, preconditioned by its diagonal blocks.
+/// Conjugate gradients on S formed as blocks, preconditioned by its diagonal blocks; mixed: blocks
+/// of floats.
 std::unique_ptr<CameraSolver> make_explicit_solver(const Columns& columns, const Chunks& chunks,
+                                                   bool mixed, const Kernels& kernels,
                                                    Threads& threads);
 
 /// What the implicit product reads: the held state, whose camera records carry x as their step.
@@ -84,8 +87,10 @@ struct HeldState {
   const Buffer<double>* weights;  ///< of the loss; empty: none
 };
 
-/// Conjugate gradients with S never formed: products recompute the Jacobians from the state.
+/// Conjugate gradients with S never formed: products recompute the Jacobians from the state; mixed:
+/// in single precision.
 std::unique_ptr<CameraSolver> make_implicit_solver(const Columns& columns, const HeldState& state,
-                                                   const Kernels& kernels, Threads& threads);
+                                                   bool mixed, const Kernels& kernels,
+                                                   Threads& threads);
 
 }  // namespace sheaf

@@ -231,23 +231,48 @@ void DenseCholesky::clear(Threads& threads) {
   });
 }
 
+/// Columns [k, k + width) from the diagonal block on down to where that ends.
+bool DenseCholesky::factor_diagonal(std::size_t k, std::size_t width) {
+  const std::size_t end = k + width, rows = (end + 7) / 8 * 8;
+  for (std::size_t s = k; s < end; s += kPanel) {
+    const std::size_t w = std::min(kPanel, end - s), next = s + w;
+    if (!kernels_.factor_block(A_.data(), lda_, s, w, inverse_.data())) return false;
+    if (next == end) break;
+    kernels_.solve_rows(A_.data(), lda_, s, w, inverse_.data(), next, rows);
+    kernels_.update(A_.data(), lda_, s, w, next, rows, next, end);
+  }
+  return true;
+}
+
+/// Rows [first, last) below that block.
+void DenseCholesky::solve_below(std::size_t k, std::size_t width, std::size_t first,
+                                std::size_t last) {
+  for (std::size_t s = k; s < k + width; s += kPanel) {
+    const std::size_t w = std::min(kPanel, k + width - s);
+    kernels_.solve_rows(A_.data(), lda_, s, w, inverse_.data(), first, last);
+    if (s + w < k + width) kernels_.update(A_.data(), lda_, s, w, first, last, s + w, k + width);
+  }
+}
+
 bool DenseCholesky::factor(Threads& threads, const std::function<bool()>* cancelled) {
   constexpr std::size_t kRows = 192, kColumns = 64, kSerial = 400;
+  // What lies beyond the caches is read and written once for each step: the more columns a step
+  // takes, the less often. Small matrices lose by that, to the part that one thread does alone.
+  const std::size_t step = n_ < 1000 ? kPanel : n_ < 1500 ? 128 : 256;
   // Below kSerial columns waking threads costs more than the work they would share.
   const auto each = [&](std::size_t tasks, const auto& task) {
     if (n_ >= kSerial) return threads.for_each(tasks, task);
     for (std::size_t t = 0; t < tasks; ++t) task(t);
   };
-  double* A = A_.data();
   const std::size_t rows = (n_ + 7) / 8 * 8;
-  for (std::size_t k = 0; k < n_; k += kPanel) {
+  for (std::size_t k = 0; k < n_; k += step) {
     if (cancelled != nullptr && (*cancelled)()) return false;
-    const std::size_t width = std::min(kPanel, n_ - k), below = k + width;
-    if (!kernels_.factor_block(A, lda_, k, width, inverse_.data())) return false;
+    const std::size_t width = std::min(step, n_ - k), below = k + width;
+    if (!factor_diagonal(k, width)) return false;
     if (below >= n_) break;
     each((rows - below + kRows - 1) / kRows, [&](std::size_t b) {
       const std::size_t first = below + b * kRows;
-      kernels_.solve_rows(A, lda_, k, width, inverse_.data(), first, std::min(rows, first + kRows));
+      solve_below(k, width, first, std::min(rows, first + kRows));
     });
     // Column blocks of the trailing matrix, each in row blocks from its diagonal down.
     const std::size_t blocks = (n_ - below + kColumns - 1) / kColumns;
@@ -255,7 +280,7 @@ bool DenseCholesky::factor(Threads& threads, const std::function<bool()>* cancel
     each(blocks * down, [&](std::size_t t) {
       const std::size_t c = below + t / down * kColumns, c_end = std::min(n_, c + kColumns);
       const std::size_t first = below + t % down * kRows, end = std::min(rows, first + kRows);
-      if (end > c) kernels_.update(A, lda_, k, width, first, end, c, c_end);
+      if (end > c) kernels_.update(A_.data(), lda_, k, width, first, end, c, c_end);
     });
   }
   return true;

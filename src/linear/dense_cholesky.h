@@ -60,6 +60,8 @@ class DenseCholesky {
  private:
   static constexpr std::size_t kPanel = 32;
   static std::size_t leading(std::size_t n);
+  bool factor_diagonal(std::size_t k, std::size_t width);
+  void solve_below(std::size_t k, std::size_t width, std::size_t first, std::size_t last);
 
   const DenseKernels& kernels_;
   std::size_t n_, lda_;

@@ -19,10 +19,12 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// Lower triangle of a 3x3 factor, diagonal inverted.
-struct Factor {
-  V i00, l10, l20, i11, l21, i22;
+/// Lower triangle of a 3x3 factor, diagonal inverted; W: lanes of double or of float.
+template <class W>
+struct FactorAs {
+  W i00, l10, l20, i11, l21, i22;
 };
+using Factor = FactorAs<V>;
 
 HWY_INLINE V inverse_sqrt(V x) { return hn::Div(set(1.0), hn::Sqrt(x)); }
 
@@ -38,7 +40,8 @@ HWY_INLINE Factor factor3(V v00, V v01, V v02, V v11, V v12, V v22) {
 }
 
 /// L^-1 s.
-HWY_INLINE void forward(const Factor& f, const V* s, V* out) {
+template <class W>
+HWY_INLINE void forward(const FactorAs<W>& f, const W* s, W* out) {
   out[0] = hn::Mul(s[0], f.i00);
   out[1] = hn::Mul(fnma(f.l10, out[0], s[1]), f.i11);
   out[2] = hn::Mul(fnma(f.l21, out[1], fnma(f.l20, out[0], s[2])), f.i22);

@@ -1,11 +1,13 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "linear/block_diagonal.h"
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
+#include "linear/float_operator.h"
 #include "linear/preconditioner.h"
 
 namespace sheaf {
@@ -75,20 +77,29 @@ class ImplicitOperator : public ImageOperator {
   std::vector<Buffer<double>> saved_;
 };
 
+/// In mixed precision the operator is single until the system asks for double.
 class ImplicitSolver : public CameraSolver {
  public:
-  ImplicitSolver(const Columns& columns, const HeldState& state, const Kernels& kernels,
+  ImplicitSolver(const Columns& columns, const HeldState& state, bool mixed, const Kernels& kernels,
                  Threads& threads)
-      : operator_(state, kernels, threads), blocks_(columns, threads), cg_(columns) {}
+      : operator_(state, kernels, threads), blocks_(columns, threads), cg_(columns) {
+    if (mixed) rounded_ = std::make_unique<FloatImplicitOperator>(columns, state, kernels, threads);
+  }
 
   CameraSolution solve(const CameraSystem& system, Buffer<double>& x) override {
     if (!blocks_.factor(system.sums.diagonal, system.damping)) return {};
-    return cg_.run(operator_, Preconditioner{blocks_, system.coarse}, system, x);
+    const bool round = rounded_ && !system.precise;
+    if (round) rounded_->prepare(system.vectors->squares.data());
+    ImageOperator& S = round ? static_cast<ImageOperator&>(*rounded_) : operator_;
+    return cg_.run(S, Preconditioner{blocks_, system.coarse}, system, x);
   }
-  std::uint64_t bytes() const override { return operator_.bytes() + blocks_.bytes() + cg_.bytes(); }
+  std::uint64_t bytes() const override {
+    return operator_.bytes() + (rounded_ ? rounded_->bytes() : 0) + blocks_.bytes() + cg_.bytes();
+  }
 
  private:
   ImplicitOperator operator_;
+  std::unique_ptr<FloatImplicitOperator> rounded_;
   BlockDiagonal blocks_;
   ConjugateGradients cg_;
 };
@@ -96,8 +107,9 @@ class ImplicitSolver : public CameraSolver {
 }  // namespace
 
 std::unique_ptr<CameraSolver> make_implicit_solver(const Columns& columns, const HeldState& state,
-                                                   const Kernels& kernels, Threads& threads) {
-  return std::make_unique<ImplicitSolver>(columns, state, kernels, threads);
+                                                   bool mixed, const Kernels& kernels,
+                                                   Threads& threads) {
+  return std::make_unique<ImplicitSolver>(columns, state, mixed, kernels, threads);
 }
 
 }  // namespace sheaf

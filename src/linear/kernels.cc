@@ -13,6 +13,7 @@
 
 #include "linear/coarse-inl.h"
 #include "linear/eliminate-inl.h"
+#include "linear/float_product-inl.h"
 #include "linear/products-inl.h"
 #include "linear/schur_product-inl.h"
 #include "linear/trial-inl.h"
@@ -63,6 +64,13 @@ void residuals(const Batches& batches, const double* cameras, const double* poin
   residuals_chunk(batches, cameras, points, chunk, out);
 }
 
+void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved, double* y) {
+  if (in.weights == nullptr)
+    product_float_chunk<false>(in, chunk, saved, y);
+  else
+    product_float_chunk<true>(in, chunk, saved, y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   return square_sum_chunk(batches, cameras, points, chunk);
@@ -74,8 +82,8 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }
 
 Kernels table(const char* name, bool fused) {
-  return {name,   fused,    &linearize, &diagonal,   &pairs,       &coarse,
-          &trial, &product, &residuals, &square_sum, &count_behind};
+  return {name,   fused,    &linearize,     &diagonal,  &pairs,      &coarse,
+          &trial, &product, &product_float, &residuals, &square_sum, &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -91,7 +99,8 @@ std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
 }
 
 std::size_t product_scratch_doubles(const Batches& batches) {
-  return std::size_t(20 * 8) * batches.longest_track;
+  // The wider of 16 fields of eight doubles and 31 of sixteen floats.
+  return std::size_t(31 * 8) * batches.longest_track;
 }
 
 std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters) {

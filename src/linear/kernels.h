@@ -102,6 +102,18 @@ struct ProductInput {
   const double* factors;
   const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
 };
+/// The same in single precision. Lengths are what the scene's are after (X - origin) scale, so that
+/// neither the place of the scene nor its unit can take digits or leave the range of floats.
+struct FloatProductInput {
+  const Batches* batches;
+  const float* cameras;   ///< kFloatCameraRecord per image, in these lengths, with x as the step
+  const double* points;   ///< as they are
+  const double* factors;  ///< as they are
+  double origin[3], scale;
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+};
+/// The 24 fields of a camera record, and 8 unused.
+constexpr std::size_t kFloatCameraRecord = 32;
 /// Per image: rho (3), phi (3), then sums of s, s n and s n^2 (s = p . e), 7 unused:
 ///   y_f = s0 + k1 s1 + k2 s2, y_k1 = f s1, y_k2 = f s2.
 constexpr std::size_t kProductRecord = 16;
@@ -130,7 +142,7 @@ struct CoarseInput {
 /// Doubles of scratch for any of these chunks, and the records laid out in it.
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks);
 Records records_in(double* scratch, const Chunks& chunks);
-/// Doubles of `saved` that a product needs.
+/// Doubles of `saved` that a product needs; as many bytes for one in floats.
 std::size_t product_scratch_doubles(const Batches& batches);
 /// Clusters that any one point can touch, and the doubles of scratch that coarse sums need.
 inline std::size_t coarse_scratch_clusters(const Batches& batches, std::int32_t clusters) {
@@ -158,6 +170,8 @@ struct Kernels {
   void (*trial)(const TrialInput&, const Chunk&, TrialOutput& out);
   /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, kProductRecord doubles per image.
   void (*product)(const ProductInput&, const Chunk&, double* saved, double* y);
+  /// The same with all but the sums over images in single precision; y_rho per `scale`d length.
+  void (*product_float)(const FloatProductInput&, const Chunk&, float* saved, double* y);
   /// |r_x| of a batch's eight lanes, then |r_y|, 16 per batch of the chunk.
   void (*residuals)(const Batches&, const double* cameras, const double* points, const Chunk&,
                     double* out);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "linear/block_rows.h"
 #include "linear/coarse_space.h"
 #include "linear/kernels.h"
 #include "linear/sparse_cholesky.h"
@@ -49,9 +50,10 @@ void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
 
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 
-/// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair, 8 ns an
-/// observation for an implicit product, 45 ns a block for an explicit one.
-constexpr double kPairNs = 4.5, kImplicitNs = 8, kBlockNs = 45, kDenseFlopsPerNs = 60;
+/// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair, 7 ns an
+/// observation for an implicit product, 12 ns a block for an explicit one, 200 ns to place a tile.
+constexpr double kPairNs = 4.5, kImplicitNs = 7, kBlockNs = 12, kPlaceNs = 200,
+                 kDenseFlopsPerNs = 85;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
 double iterations(const WorkCounts& c) { return c.clusters > 0 ? 15 : 25; }
@@ -76,8 +78,7 @@ double dense_seconds(const WorkCounts& c) {
   const double n = static_cast<double>(c.columns);
   return forming_seconds(c) + seconds(n * n * n / 3 / kDenseFlopsPerNs);
 }
-/// Measured; wide panels run faster than one dense matrix, which leaves the caches. Panels are also
-/// cleared, filled and read twice to substitute.
+/// Measured. Panels are also cleared, filled and read twice to substitute.
 constexpr double kSparseFlopsPerNs = 65, kSparseEntryNs = 2.5;
 double sparse_seconds(const WorkCounts& c) {
   return forming_seconds(c) + seconds(c.sparse_flops / kSparseFlopsPerNs +
@@ -85,7 +86,8 @@ double sparse_seconds(const WorkCounts& c) {
 }
 double explicit_seconds(const WorkCounts& c) {
   const double blocks = 2 * static_cast<double>(c.tiles) + static_cast<double>(c.images);
-  return forming_seconds(c) + coarse_seconds(c) + seconds((iterations(c) + 4) * kBlockNs * blocks);
+  return forming_seconds(c) + coarse_seconds(c) +
+         seconds(kPlaceNs * static_cast<double>(c.tiles) + iterations(c) * kBlockNs * blocks);
 }
 double implicit_seconds(const WorkCounts& c) {
   return coarse_seconds(c) +
@@ -175,7 +177,14 @@ int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
   return std::max(1, static_cast<int>(std::min({32.0, flops / kFlopsPerSlice, kBytes / sums})));
 }
 
-std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) {
+bool has_mixed(SolverKind kind) {
+  return kind == SolverKind::implicit_cg || kind == SolverKind::explicit_cg;
+}
+
+bool prefers_mixed(SolverKind kind) { return has_mixed(kind); }
+
+std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads) {
+  const SolverKind kind = plan.kind;
   const bool pairs = kind != SolverKind::blocks && kind != SolverKind::implicit_cg;
   const std::uint64_t tiles = pairs ? c.tiles : 0;
   const auto slices = static_cast<std::uint64_t>(
@@ -187,12 +196,15 @@ std::uint64_t forecast_bytes(const WorkCounts& c, SolverKind kind, int threads) 
   sum += slices * 8 * (kTileDoubles * tiles + kDiagonalDoubles * c.images);
   sum += static_cast<std::uint64_t>(threads) * 8 * 8 *
          (48 * std::max<std::uint64_t>(Chunks::kBatchesPerChunk, c.longest_track) +
-          46 * std::uint64_t(c.longest_track));
+          57 * std::uint64_t(c.longest_track));
   if (pairs) sum += 4 * c.pairs + 8 * tiles + 6 * c.observations;
   if (kind == SolverKind::dense) sum += 8 * c.columns * (c.columns + 8);
   if (kind == SolverKind::sparse) sum += c.sparse_bytes;
-  if (kind == SolverKind::explicit_cg) sum += (2 * tiles + c.images) * (8 * 88 + 20);
-  if (kind == SolverKind::implicit_cg) sum += slices * 8 * kProductRecord * c.images;
+  if (kind == SolverKind::explicit_cg)
+    sum += (2 * tiles + c.images) * (8 * kBlockEntry + 20) + 256 * c.images;
+  if (kind == SolverKind::implicit_cg)
+    sum += slices * 8 * kProductRecord * c.images +
+           (plan.mixed ? slices * 8 * kProductRecord + 4 * kFloatCameraRecord : 0) * c.images;
   if (kind != SolverKind::dense && kind != SolverKind::sparse)
     sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
   if ((kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg) && c.clusters > 0)

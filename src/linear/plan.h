@@ -39,7 +39,13 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
 struct Plan {
   SolverKind kind = SolverKind::dense;
   std::string reason;
+  bool mixed = false;  ///< float inside the solver
 };
+
+/// Whether the solver has a variant with float inside, and whether that is the quicker one: a pure
+/// function of the kind.
+bool has_mixed(SolverKind kind);
+bool prefers_mixed(SolverKind kind);
 
 /// The cheapest by a model of flops and bytes per step: a pure function of the counts.
 Plan plan_solver(const WorkCounts& counts);
@@ -48,7 +54,7 @@ Plan plan_solver(const WorkCounts& counts);
 SolverKind cheaper_iterative(const WorkCounts& counts);
 
 /// Bytes that the system will hold with this solver, what the batches hold included.
-std::uint64_t forecast_bytes(const WorkCounts& counts, SolverKind kind, int threads);
+std::uint64_t forecast_bytes(const WorkCounts& counts, const Plan& plan, int threads);
 
 /// Flops to linearise so many batches and to multiply so many pairs.
 double linearize_flops(std::uint64_t batches, std::uint64_t pairs);

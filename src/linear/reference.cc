@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "geometry/bal_camera.h"
 #include "linear/kernel_table.h"
@@ -244,15 +245,8 @@ void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, dou
 std::array<double, 2> camera_motion(const Row& row, const double* record) {
   const double* s = record + camera_record::kStep;
   const double f = record[12];
-  const std::array<double, 9> dc{s[3],
-                                 s[4],
-                                 s[5],
-                                 s[0],
-                                 s[1],
-                                 s[2],
-                                 s[6],
-                                 (s[7] - record[13] * s[6]) / f,
-                                 (s[8] - record[14] * s[6]) / f};
+  const double dk1 = (s[7] - record[13] * s[6]) / f, dk2 = (s[8] - record[14] * s[6]) / f;
+  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6], dk1, dk2};
   std::array<double, 2> e{};
   for (int r = 0; r < 2; ++r)
     for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];
@@ -450,15 +444,35 @@ void residuals(const Batches& batches, const double* cameras, const double* poin
       }
 }
 
+/// In double: points and factors as the scaled lengths have them, cameras as they were rounded.
+void product_float(const FloatProductInput& in, const Chunk& chunk, float*, double* y) {
+  std::size_t images = 0;
+  for (std::size_t b = 8 * chunk.first_batch; b < 8 * chunk.end_batch; ++b)
+    images = std::max(images, std::size_t{1} + in.batches->image[b]);
+  std::vector<double> cameras(kCameraRecord * images);
+  for (std::size_t i = 0; i < images; ++i)
+    std::copy_n(in.cameras + kFloatCameraRecord * i, kCameraRecord, &cameras[kCameraRecord * i]);
+  std::vector<double> points(kPointGroup * chunk.end_group);
+  std::vector<double> factors(kFactorGroup * chunk.end_group);
+  for (std::size_t i = kPointGroup * chunk.first_group; i < points.size(); ++i)
+    points[i] = (in.points[i] - in.origin[i / 8 % 3]) * in.scale;
+  for (std::size_t i = kFactorGroup * chunk.first_group; i < factors.size(); ++i) {
+    const std::size_t field = i / 8 % 12;
+    const bool inverse = field == 0 || field == 3 || field == 5;
+    factors[i] = in.factors[i] * (inverse ? in.scale : 1 / in.scale);
+  }
+  product({in.batches, cameras.data(), points.data(), factors.data(), in.weights}, chunk, nullptr,
+          y);
+}
+
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
   double sum = 0;
   for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
     for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l)
       for (std::uint32_t o = 0; o < batches.groups[g].track; ++o) {
-        const Row row =
-            row_of(batches, cameras, point_of(points, g, l), batches.groups[g].first_batch + o, l);
-        sum += row.square();
+        const std::uint64_t b = batches.groups[g].first_batch + o;
+        sum += row_of(batches, cameras, point_of(points, g, l), b, l).square();
       }
   return sum;
 }
@@ -477,9 +491,9 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference", false,       &linearize,   &diagonal,
-                               &pairs,      &coarse,     &trial,       &product,
-                               &residuals,  &square_sum, &count_behind};
+  static const Kernels kernels{"reference",    false,      &linearize,  &diagonal,
+                               &pairs,         &coarse,    &trial,      &product,
+                               &product_float, &residuals, &square_sum, &count_behind};
   return kernels;
 }
 

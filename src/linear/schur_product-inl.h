@@ -16,54 +16,58 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// What the second sweep over a point's track needs from the first: kSweepFields vectors.
-constexpr int kSweepFields = 20;
-
-HWY_INLINE void save_sweep(const V* c, const Seen& s, V fd, V dd, V e0, V e1, double* to) {
-  const V all[11] = {s.P0, s.P1, s.P2, s.iz, s.x, s.y, s.n, fd, dd, e0, e1};
-  for (int i = 0; i < 11; ++i) store(all[i], to + i * kLanes);
-  for (int i = 0; i < 9; ++i) store(c[i], to + (11 + i) * kLanes);
-}
+/// What the second sweep over a point's track needs from the first: iz, p, f d, dd and e, kept as
+/// this many vectors, and the rotation.
+constexpr int kSweepFields = 7;
 
 /// e = w Jc x of one observation per lane (also saved), and s += Jp^T e; weight: nullptr for w = 1
 /// in all lanes.
-HWY_INLINE void first_sweep(const V* c, V X0, V X1, V X2, const V* weight, double* saved, V* s) {
-  const Seen seen = see(c, X0, X1, X2);
-  const V fd = hn::Mul(c[12], distortion(c, seen.n));
-  const V dd = distortion_slope(c, seen.n);
-  V e0, e1;
+template <class C, class W>
+HWY_INLINE void first_sweep(const C& c, W X0, W X1, W X2, const W* weight, hn::TFromV<W>* saved,
+                            W* s) {
+  const SeenAs<W> seen = see(c, X0, X1, X2);
+  const W fd = hn::Mul(c[12], distortion(c, seen.n));
+  const W dd = distortion_slope(c, seen.n);
+  W e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
   if (weight != nullptr) e0 = hn::Mul(e0, *weight), e1 = hn::Mul(e1, *weight);
-  save_sweep(c, seen, fd, dd, e0, e1, saved);
+  const hn::DFromV<W> d;
+  const std::size_t lanes = hn::Lanes(d);
+  hn::Store(seen.iz, d, saved), hn::Store(seen.x, d, saved + lanes);
+  hn::Store(seen.y, d, saved + 2 * lanes), hn::Store(fd, d, saved + 3 * lanes);
+  hn::Store(dd, d, saved + 4 * lanes), hn::Store(e0, d, saved + 5 * lanes);
+  hn::Store(e1, d, saved + 6 * lanes);
   add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
 /// v = Jc^T (e - w Jp u), in the order of the product's record: rho (3), phi (3), then the sums of
 /// s, s n and s n^2 with s = p . e that make up the intrinsics.
-template <bool Robust>
-HWY_INLINE void second_sweep(const double* from, const double* weights, const V* u, V* v) {
-  V f[kSweepFields];
-  for (int i = 0; i < kSweepFields; ++i) f[i] = load(from + i * kLanes);
-  const V P0 = f[0], P1 = f[1], P2 = f[2], iz = f[3], x = f[4], y = f[5], n = f[6], fd = f[7],
-          dd = f[8];
-  const V* R = f + 11;
-  const V m0 = fma(R[0], u[0], fma(R[1], u[1], hn::Mul(R[2], u[2])));
-  const V m1 = fma(R[3], u[0], fma(R[4], u[1], hn::Mul(R[5], u[2])));
-  const V m2 = fma(R[6], u[0], fma(R[7], u[1], hn::Mul(R[8], u[2])));
-  const V w = Robust ? hn::Mul(iz, load(weights)) : iz;
-  const V dx = hn::Mul(w, fma(x, m2, m0)), dy = hn::Mul(w, fma(y, m2, m1));
-  const V along = hn::Mul(dd, fma(x, dx, hn::Mul(y, dy)));
-  const V e0 = hn::Sub(f[9], fma(fd, dx, hn::Mul(along, x)));
-  const V e1 = hn::Sub(f[10], fma(fd, dy, hn::Mul(along, y)));
-  const V s = fma(x, e0, hn::Mul(y, e1));
-  const V t = hn::Mul(dd, s);
-  const V h0 = hn::Mul(iz, fma(fd, e0, hn::Mul(t, x)));
-  const V h1 = hn::Mul(iz, fma(fd, e1, hn::Mul(t, y)));
-  const V h2 = fma(x, h0, hn::Mul(y, h1));
-  v[0] = h0, v[1] = h1, v[2] = h2;
-  v[3] = fms(P1, h2, hn::Mul(P2, h1));
-  v[4] = fms(P2, h0, hn::Mul(P0, h2));
-  v[5] = fms(P0, h1, hn::Mul(P1, h0));
+template <bool Robust, class W>
+HWY_INLINE void second_sweep(const hn::TFromV<W>* rotation, const hn::TFromV<W>* saved, W w,
+                             const W* u, W* v) {
+  const hn::DFromV<W> d;
+  const std::size_t lanes = hn::Lanes(d);
+  const auto R = [&](int i) { return hn::Load(d, rotation + i * lanes); };
+  const auto field = [&](int i) { return hn::Load(d, saved + i * lanes); };
+  const W iz = field(0), x = field(1), y = field(2), fd = field(3), dd = field(4);
+  const W m0 = fma(R(0), u[0], fma(R(1), u[1], hn::Mul(R(2), u[2])));
+  const W m1 = fma(R(3), u[0], fma(R(4), u[1], hn::Mul(R(5), u[2])));
+  const W m2 = fma(R(6), u[0], fma(R(7), u[1], hn::Mul(R(8), u[2])));
+  const W wz = Robust ? hn::Mul(iz, w) : iz;
+  const W dx = hn::Mul(wz, fma(x, m2, m0)), dy = hn::Mul(wz, fma(y, m2, m1));
+  const W along = hn::Mul(dd, fma(x, dx, hn::Mul(y, dy)));
+  const W e0 = hn::Sub(field(5), fma(fd, dx, hn::Mul(along, x)));
+  const W e1 = hn::Sub(field(6), fma(fd, dy, hn::Mul(along, y)));
+  const W s = fma(x, e0, hn::Mul(y, e1));
+  const W t = hn::Mul(dd, s);
+  // A^T e = iz (g0, g1, g2), and P x A^T e with iz P = (x, y, -1).
+  const W g0 = fma(fd, e0, hn::Mul(t, x)), g1 = fma(fd, e1, hn::Mul(t, y));
+  const W g2 = fma(x, g0, hn::Mul(y, g1));
+  v[0] = hn::Mul(iz, g0), v[1] = hn::Mul(iz, g1), v[2] = hn::Mul(iz, g2);
+  v[3] = fma(y, g2, g1);
+  v[4] = hn::Neg(fma(x, g2, g0));
+  v[5] = fms(x, g1, hn::Mul(y, g0));
+  const W n = fma(x, x, hn::Mul(y, y));
   v[6] = s;
   v[7] = hn::Mul(s, n);
   v[8] = hn::Mul(v[7], n);
@@ -96,7 +100,7 @@ template <bool Robust>
 HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& group, std::size_t g,
                               double* saved, double* sums) {
   const Batches& batches = *in.batches;
-  constexpr std::size_t kPart = kSweepFields * kLanes;
+  constexpr std::size_t kPart = (9 + kSweepFields) * kLanes;
   V u[kParts][3];
   for (int part = 0; part < kParts; ++part) {
     const int lane = part * kLanes;
@@ -108,10 +112,11 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
       const std::uint64_t b = group.first_batch + o;
       V c[24];
       load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+      double* to = saved + kPart * (kParts * o + part);
+      for (int i = 0; i < 9; ++i) store(c[i], to + i * kLanes);
       V weight = mask;
       if constexpr (Robust) weight = hn::Mul(mask, load(in.weights + 8 * b + lane));
-      first_sweep(c, X0, X1, X2, Robust || group.lanes < 8 ? &weight : nullptr,
-                  saved + kPart * (kParts * o + part), s);
+      first_sweep(c, X0, X1, X2, Robust || group.lanes < 8 ? &weight : nullptr, to + 9 * kLanes, s);
     }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
   }
@@ -120,8 +125,10 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
     alignas(64) double rows[64], ninth[8];
     for (int part = 0; part < kParts; ++part) {
       V v[9];
-      const double* weights = Robust ? in.weights + 8 * b + part * kLanes : nullptr;
-      second_sweep<Robust>(saved + kPart * (kParts * o + part), weights, u[part], v);
+      const double* from = saved + kPart * (kParts * o + part);
+      V weight = zero();  // not read without a loss
+      if constexpr (Robust) weight = load(in.weights + 8 * b + part * kLanes);
+      second_sweep<Robust>(from, from + 9 * kLanes, weight, u[part], v);
       store_records(v, rows + 8 * part * kLanes, 8);
       store(v[8], ninth + part * kLanes);
     }
@@ -131,8 +138,11 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
 
 template <bool Robust>
 inline void product_chunk(const ProductInput& in, const Chunk& chunk, double* saved, double* sums) {
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+  const std::size_t groups = in.batches->groups.size();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    prefetch_groups(in.points, in.factors, 6, g + 1, std::min<std::size_t>(g + 2, groups));
     product_group<Robust>(in, in.batches->groups[g], g, saved, sums);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -15,6 +15,7 @@ struct StepRequest {
   double forcing = 0.1;  ///< how exactly an iterative solver solves (CameraSystem::forcing)
   ScaledLoss loss{};     ///< of the held state's cost, of the step and of its trial
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
+  bool precise = false;  ///< solve in double, even where float would do for the way there
 };
 
 /// A damped Gauss-Newton step was computed (or not), points eliminated, from the held state.

@@ -10,6 +10,10 @@
 #define SHEAF_LINEAR_TRIAL_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+
 #include "linear/eliminate-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -17,25 +21,27 @@ namespace sheaf {
 namespace HWY_NAMESPACE {
 
 /// e = Jc dc of one observation per lane; c holds the 24 fields of camera and step.
-HWY_INLINE void camera_motion(const V* c, const Seen& seen, V fd, V dd, V& e0, V& e1) {
-  // dP = phi x P + rho; d p = iz (dP.xy + p dP.z)
-  const V m0 = fma(c[16], seen.P2, fnma(c[17], seen.P1, c[18]));
-  const V m1 = fma(c[17], seen.P0, fnma(c[15], seen.P2, c[19]));
-  const V m2 = fma(c[15], seen.P1, fnma(c[16], seen.P0, c[20]));
-  const V dx = hn::Mul(seen.iz, fma(seen.x, m2, m0));
-  const V dy = hn::Mul(seen.iz, fma(seen.y, m2, m1));
-  const V intrinsic = fma(seen.n, fma(seen.n, c[23], c[22]), c[21]);
-  const V along = fma(dd, fma(seen.x, dx, hn::Mul(seen.y, dy)), intrinsic);
+template <class C, class W>
+HWY_INLINE void camera_motion(const C& c, const SeenAs<W>& seen, W fd, W dd, W& e0, W& e1) {
+  // dP = phi x P + rho, d p = iz (dP.xy + p dP.z), and iz P = (x, y, -1).
+  const W m0 = fnma(c[17], seen.y, fms(seen.iz, c[18], c[16]));
+  const W m1 = fma(c[17], seen.x, fma(seen.iz, c[19], c[15]));
+  const W m2 = fnma(c[16], seen.x, fma(c[15], seen.y, hn::Mul(seen.iz, c[20])));
+  const W dx = fma(seen.x, m2, m0);
+  const W dy = fma(seen.y, m2, m1);
+  const W intrinsic = fma(seen.n, fma(seen.n, c[23], c[22]), c[21]);
+  const W along = fma(dd, fma(seen.x, dx, hn::Mul(seen.y, dy)), intrinsic);
   e0 = fma(fd, dx, hn::Mul(along, seen.x));
   e1 = fma(fd, dy, hn::Mul(along, seen.y));
 }
 
 /// s += Jp^T e: A^T e with A = iz (fd I + dd p p^T) [I | p], then R^T.
-HWY_INLINE void add_to_point(const V* c, const Seen& seen, V fd, V dd, V e0, V e1, V* s) {
-  const V t = hn::Mul(dd, fma(seen.x, e0, hn::Mul(seen.y, e1)));
-  const V h0 = hn::Mul(seen.iz, fma(fd, e0, hn::Mul(t, seen.x)));
-  const V h1 = hn::Mul(seen.iz, fma(fd, e1, hn::Mul(t, seen.y)));
-  const V h2 = fma(seen.x, h0, hn::Mul(seen.y, h1));
+template <class C, class W>
+HWY_INLINE void add_to_point(const C& c, const SeenAs<W>& seen, W fd, W dd, W e0, W e1, W* s) {
+  const W t = hn::Mul(dd, fma(seen.x, e0, hn::Mul(seen.y, e1)));
+  const W h0 = hn::Mul(seen.iz, fma(fd, e0, hn::Mul(t, seen.x)));
+  const W h1 = hn::Mul(seen.iz, fma(fd, e1, hn::Mul(t, seen.y)));
+  const W h2 = fma(seen.x, h0, hn::Mul(seen.y, h1));
   for (int i = 0; i < 3; ++i) s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
 }
 
@@ -62,12 +68,23 @@ HWY_INLINE V squared_residual(const V* c, const Seen& s, V zx, V zy) {
   return fma(r0, r0, hn::Mul(r1, r1));
 }
 
+/// The points and the first `rows` rows of the factors of groups [first, end): asked for early,
+/// because they come from far away and nothing of a group can begin without them.
+HWY_INLINE void prefetch_groups(const double* points, const double* factors, int rows,
+                                std::size_t first, std::size_t end) {
+  for (std::size_t g = first; g < end; ++g) {
+    for (int i = 0; i < 3; ++i) hwy::Prefetch(points + kPointGroup * g + 8 * i);
+    for (int i = 0; i < rows; ++i) hwy::Prefetch(factors + kFactorGroup * g + 8 * i);
+  }
+}
+
 HWY_INLINE Factor load_factor(const double* pd) {
   return {load(pd), load(pd + 8), load(pd + 16), load(pd + 24), load(pd + 32), load(pd + 40)};
 }
 
 /// L^-T u.
-HWY_INLINE void backward(const Factor& f, const V* u, V* d) {
+template <class W>
+HWY_INLINE void backward(const FactorAs<W>& f, const W* u, W* d) {
   d[2] = hn::Mul(u[2], f.i22);
   d[1] = hn::Mul(fnma(f.l21, d[2], u[1]), f.i11);
   d[0] = hn::Mul(fnma(f.l20, d[2], fnma(f.l10, d[1], u[0])), f.i00);
@@ -227,9 +244,12 @@ inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& o
   TrialSums sums;
   for (int p = 0; p < kParts; ++p)
     sums.square[p] = sums.loss[p] = sums.damping[p] = sums.step2[p] = sums.behind[p] = zero();
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+  const std::size_t groups = in.batches->groups.size();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    prefetch_groups(in.points, in.factors, 12, g + 1, std::min<std::size_t>(g + 2, groups));
     for (int p = 0; p < kParts; ++p)
       trial_part<Robust>(in, in.batches->groups[g], g, p, out.points, sums);
+  }
   out.square_sum += sum_parts(sums.square);
   if (Robust) out.loss_sum += sum_parts(sums.loss);
   out.damping_term += sum_parts(sums.damping);

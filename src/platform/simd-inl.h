@@ -30,10 +30,24 @@ HWY_INLINE V load(const double* p) { return hn::Load(D(), p); }
 HWY_INLINE void store(V v, double* p) { hn::Store(v, D(), p); }
 HWY_INLINE V set(double x) { return hn::Set(D(), x); }
 HWY_INLINE V zero() { return hn::Zero(D()); }
+/// x in all lanes of a vector like W, of double or float.
+template <class W>
+HWY_INLINE W fill(double x) {
+  return hn::Set(hn::DFromV<W>(), static_cast<hn::TFromV<W>>(x));
+}
 /// a b + c, a b - c, c - a b
-HWY_INLINE V fma(V a, V b, V c) { return hn::MulAdd(a, b, c); }
-HWY_INLINE V fms(V a, V b, V c) { return hn::MulSub(a, b, c); }
-HWY_INLINE V fnma(V a, V b, V c) { return hn::NegMulAdd(a, b, c); }
+template <class W>
+HWY_INLINE W fma(W a, W b, W c) {
+  return hn::MulAdd(a, b, c);
+}
+template <class W>
+HWY_INLINE W fms(W a, W b, W c) {
+  return hn::MulSub(a, b, c);
+}
+template <class W>
+HWY_INLINE W fnma(W a, W b, W c) {
+  return hn::NegMulAdd(a, b, c);
+}
 
 /// Lane K of an eight-double record, in all lanes. On AVX-512 the odd ones are permuted out of the
 /// register that holds the record, so that loads and shuffles share the work: broadcasts from

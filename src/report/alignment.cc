@@ -12,11 +12,20 @@ namespace {
 
 using Matrix4 = std::array<std::array<double, 4>, 4>;
 
-Vector3<double> mean_of(const std::vector<Vector3<double>>& points) {
+double weight_at(const std::vector<double>& weights, std::size_t i) {
+  return weights.empty() ? 1 : weights[i];
+}
+
+Vector3<double> mean_of(const std::vector<Vector3<double>>& points,
+                        const std::vector<double>& weights) {
   Vector3<double> sum{};
-  for (const auto& point : points)
-    for (int k = 0; k < 3; ++k) sum[k] += point[k];
-  for (double& x : sum) x /= static_cast<double>(points.size());
+  double total = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double w = weight_at(weights, i);
+    total += w;
+    for (int k = 0; k < 3; ++k) sum[k] += w * points[i][k];
+  }
+  for (double& x : sum) x /= total;
   return sum;
 }
 
@@ -62,16 +71,18 @@ Vector3<double> Similarity::operator()(const Vector3<double>& X) const {
   return out;
 }
 
-Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to) {
+Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
+                const std::vector<double>& weights) {
   if (from.empty()) return {};
-  const Vector3<double> a = mean_of(from), b = mean_of(to);
-  double S[3][3] = {};  // sum of (from - a) (to - b)^T
+  const Vector3<double> a = mean_of(from, weights), b = mean_of(to, weights);
+  double S[3][3] = {};  // sum of w (from - a) (to - b)^T
   double from_square = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
+    const double w = weight_at(weights, i);
     for (int r = 0; r < 3; ++r) {
       const double x = from[i][r] - a[r];
-      from_square += x * x;
-      for (int c = 0; c < 3; ++c) S[r][c] += x * (to[i][c] - b[c]);
+      from_square += w * x * x;
+      for (int c = 0; c < 3; ++c) S[r][c] += w * x * (to[i][c] - b[c]);
     }
   }
   const double yz = S[1][2] - S[2][1], zx = S[2][0] - S[0][2], xy = S[0][1] - S[1][0];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "geometry/rotation.h"
@@ -25,8 +26,21 @@ struct Alignment {
   double certainty = 0;
 };
 
-/// The similarity that minimises sum |to_i - S(from_i)|^2 (Horn 1987: the rotation is the largest
-/// eigenvector of a symmetric 4x4 matrix). The scale is 1 where `from` is a single place.
-Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to);
+/// The similarity that minimises sum w_i |to_i - S(from_i)|^2 (Horn 1987: the rotation is the
+/// largest eigenvector of a symmetric 4x4 matrix); without weights each is 1. The scale is 1 where
+/// `from` is a single place.
+Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
+                const std::vector<double>& weights = {});
+
+/// The same, not led astray where almost half the places are wrong: of the similarities through
+/// three places each (chosen by a fixed seed) the one of least median distance, then weights
+/// 1 / (1 + (distance / s)^2) (Cauchy's) with s = 2.385 sigma, sigma from the median distance,
+/// until they settle. `inliers`: the places that end within 3 s.
+struct RobustAlignment {
+  Alignment alignment;
+  std::size_t inliers = 0;
+};
+RobustAlignment align_robustly(const std::vector<Vector3<double>>& from,
+                               const std::vector<Vector3<double>>& to);
 
 }  // namespace sheaf

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "geometry/rotation.h"
-#include "report/alignment.h"
 
 namespace sheaf {
 namespace {
@@ -41,10 +39,34 @@ std::vector<Vector3<double>> points_of(const Problem& problem) {
 // Below this certainty noise in the places turns the whole scene.
 constexpr double kCertain = 0.01;
 
-Alignment alignment_between(const Problem& estimate, const Problem& reference) {
-  const Alignment by_centers = align(centers_of(estimate), centers_of(reference));
-  if (by_centers.certainty > kCertain) return by_centers;
-  return align(points_of(estimate), points_of(reference));
+StateAlignment alignment_of(const std::vector<Vector3<double>>& from,
+                            const std::vector<Vector3<double>>& to, AlignBy align_by,
+                            double certain) {
+  Alignment found;
+  StateAlignment out;
+  out.places = out.inliers = from.size();
+  if (align_by == AlignBy::robust) {
+    const RobustAlignment robust = align_robustly(from, to);
+    found = robust.alignment;
+    out.inliers = robust.inliers;
+  } else {
+    found = align(from, to);
+  }
+  out.aligned = found.certainty > certain;
+  if (out.aligned) out.similarity = found.similarity;
+  return out;
+}
+
+StateAlignment alignment_between(const Problem& estimate, const Problem& reference,
+                                 AlignBy align_by) {
+  if (align_by == AlignBy::nothing) return {};
+  const StateAlignment by_centers =
+      alignment_of(centers_of(estimate), centers_of(reference), align_by, kCertain);
+  if (by_centers.aligned) return by_centers;
+  StateAlignment by_points =
+      alignment_of(points_of(estimate), points_of(reference), align_by, 1e-6);
+  by_points.by_points = true;
+  return by_points;
 }
 
 }  // namespace
@@ -59,8 +81,8 @@ ErrorStatistics statistics_of_errors(std::vector<double> values) {
           std::sqrt(squares / static_cast<double>(n)), values.back()};
 }
 
-Result<StateErrors> compare_states(const Problem& estimate, const Problem& reference,
-                                   bool aligned) {
+Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference,
+                               AlignBy align_by) {
   if (estimate.num_images() != reference.num_images() ||
       estimate.num_points() != reference.num_points())
     return Error(ErrorCode::usage, "the estimate has " + std::to_string(estimate.num_images()) +
@@ -68,35 +90,45 @@ Result<StateErrors> compare_states(const Problem& estimate, const Problem& refer
                                        " points, the reference " +
                                        std::to_string(reference.num_images()) + " and " +
                                        std::to_string(reference.num_points()));
-  Similarity similarity;
-  if (aligned) {
-    const Alignment found = alignment_between(estimate, reference);
-    aligned = found.certainty > 1e-6;
-    if (aligned) similarity = found.similarity;
-  }
+  ErrorLists out;
+  out.alignment = alignment_between(estimate, reference, align_by);
+  const Similarity& similarity = out.alignment.similarity;
   const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
-  std::vector<double> rotation, translation, center, point;
   for (std::size_t j = 0; j < estimate.num_images(); ++j) {
     const Pose& want = reference.poses[j];
     const Quaternion<double> q =
         multiply(Quaternion<double>(estimate.poses[j].rotation), conjugate(similarity.rotation));
     const Vector3<double> phi = angle_axis_from_quaternion(multiply(q, conjugate(want.rotation)));
-    rotation.push_back(distance(phi, {}));
+    out.rotation_rad.push_back(distance(phi, {}));
     const Vector3<double> c = similarity(centers[j]);
-    center.push_back(distance(c, reference_centers[j]));
+    out.center.push_back(distance(c, reference_centers[j]));
     Vector3<double> t = multiply(matrix_from_quaternion(q), c);
     for (double& x : t) x = -x;
-    translation.push_back(distance(t, want.translation));
+    // Unaligned, t is as it stands: through the centre it would lose digits.
+    if (!out.alignment.aligned) t = estimate.poses[j].translation;
+    out.translation.push_back(distance(t, want.translation));
   }
   const auto points = points_of(estimate), reference_points = points_of(reference);
   for (std::size_t i = 0; i < points.size(); ++i)
-    point.push_back(distance(similarity(points[i]), reference_points[i]));
-  return StateErrors{aligned,
-                     similarity.scale,
-                     statistics_of_errors(std::move(rotation)),
-                     statistics_of_errors(std::move(translation)),
-                     statistics_of_errors(std::move(center)),
-                     statistics_of_errors(std::move(point))};
+    out.point.push_back(distance(similarity(points[i]), reference_points[i]));
+  return out;
+}
+
+StateErrors summarise(const ErrorLists& lists) {
+  return {lists.alignment.aligned,
+          lists.alignment.similarity.scale,
+          statistics_of_errors(lists.rotation_rad),
+          statistics_of_errors(lists.translation),
+          statistics_of_errors(lists.center),
+          statistics_of_errors(lists.point)};
+}
+
+Result<StateErrors> compare_states(const Problem& estimate, const Problem& reference,
+                                   bool aligned) {
+  const Result<ErrorLists> lists =
+      list_errors(estimate, reference, aligned ? AlignBy::least_squares : AlignBy::nothing);
+  if (!lists.ok()) return lists.error();
+  return summarise(lists.value());
 }
 
 }  // namespace sheaf

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
+#include "report/alignment.h"
 #include "sheaf/error.h"
 #include "sheaf/problem.h"
 
@@ -15,20 +17,46 @@ struct ErrorStatistics {
 };
 ErrorStatistics statistics_of_errors(std::vector<double> values);
 
-/// How far an estimate is from a reference with the same images and points. Scene units are the
-/// reference's.
+/// How an estimate is brought to its reference before they are compared.
+enum class AlignBy {
+  nothing,        ///< as the files have it
+  least_squares,  ///< the Sim(3) that brings the camera centres together best
+  robust,         ///< likewise, not led astray by some that are far off
+};
+
+/// What an estimate was aligned by. Where the camera centres do not determine a rotation well
+/// (fewer than three, or almost on a line), the points take their place.
+struct StateAlignment {
+  bool aligned = false;  ///< false also where neither centres nor points determine it
+  Similarity similarity;
+  bool by_points = false;
+  std::size_t places = 0;   ///< centres or points
+  std::size_t inliers = 0;  ///< of them, with `robust`; all of them otherwise
+};
+
+/// Each error: a rotation's angle in radians, |t - t_reference|, distances of camera centres and
+/// points. Scene units are the reference's.
+struct ErrorLists {
+  StateAlignment alignment;
+  std::vector<double> rotation_rad, translation, center;  ///< one for each image
+  std::vector<double> point;
+};
+
+/// Errors: ErrorCode::usage when the counts differ.
+Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference, AlignBy align);
+
+/// How far an estimate is from a reference with the same images and points.
 struct StateErrors {
-  bool aligned = false;  ///< by the Sim(3) that brings the camera centres together best
-  double scale = 1;      ///< of that Sim(3)
+  bool aligned = false;
+  double scale = 1;  ///< of the Sim(3)
   ErrorStatistics rotation_error_rad;
-  ErrorStatistics translation_error;  ///< |t - t_reference|
+  ErrorStatistics translation_error;
   ErrorStatistics center_error;
   ErrorStatistics point_error;
 };
+StateErrors summarise(const ErrorLists& lists);
 
-/// Errors: ErrorCode::usage when the counts differ. Where the camera centres do not determine a
-/// rotation well (fewer than three, or almost on a line), the points take their place in the
-/// alignment.
+/// The two together, by least squares or raw.
 Result<StateErrors> compare_states(const Problem& estimate, const Problem& reference, bool align);
 
 }  // namespace sheaf

@@ -28,17 +28,22 @@ HWY_INLINE void load_cameras(const double* cameras, const std::uint32_t* image,
   }
 }
 
-/// A point in the camera's frame and its normalised image p = -P.xy / P.z.
-struct Seen {
-  V P0, P1, P2, iz, x, y, n;
+/// A point in the camera's frame and its normalised image p = -P.xy / P.z; W: lanes of double or
+/// of float.
+template <class W>
+struct SeenAs {
+  W P0, P1, P2, iz, x, y, n;
 };
+using Seen = SeenAs<V>;
 
-HWY_INLINE Seen see(const V* c, V X0, V X1, V X2) {
-  Seen s;
+/// c: the fields of the camera records by number, an array of W or what reads one.
+template <class C, class W>
+HWY_INLINE SeenAs<W> see(const C& c, W X0, W X1, W X2) {
+  SeenAs<W> s;
   s.P0 = fma(c[0], X0, fma(c[1], X1, fma(c[2], X2, c[9])));
   s.P1 = fma(c[3], X0, fma(c[4], X1, fma(c[5], X2, c[10])));
   s.P2 = fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[11])));
-  s.iz = hn::Div(set(-1.0), s.P2);
+  s.iz = hn::Div(fill<W>(-1.0), s.P2);
   s.x = hn::Mul(s.P0, s.iz);
   s.y = hn::Mul(s.P1, s.iz);
   s.n = fma(s.x, s.x, hn::Mul(s.y, s.y));
@@ -46,12 +51,16 @@ HWY_INLINE Seen see(const V* c, V X0, V X1, V X2) {
 }
 
 /// d = 1 + k1 n + k2 n^2.
-HWY_INLINE V distortion(const V* c, V n) { return fma(n, fma(n, c[14], c[13]), set(1.0)); }
+template <class C, class W>
+HWY_INLINE W distortion(const C& c, W n) {
+  return fma(n, fma(n, c[14], c[13]), fill<W>(1.0));
+}
 
 /// dd = f (2 k1 + 4 k2 n).
-HWY_INLINE V distortion_slope(const V* c, V n) {
-  const V k1 = hn::Add(c[13], c[13]);
-  const V k2 = hn::Mul(set(4.0), c[14]);
+template <class C, class W>
+HWY_INLINE W distortion_slope(const C& c, W n) {
+  const W k1 = hn::Add(c[13], c[13]);
+  const W k2 = hn::Mul(fill<W>(4.0), c[14]);
   return hn::Mul(c[12], fma(k2, n, k1));
 }
 

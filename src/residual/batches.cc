@@ -50,6 +50,49 @@ ByPoint list_by_point(const Problem& p, const std::vector<std::uint8_t>& skip) {
   return out;
 }
 
+/// Neighbours in the order in which points are visited should see the same images, so that their
+/// records are still in cache: each image's place in a breadth-first walk from image to image by
+/// the points that they share. Empty where the images' records fit into the cache in any order.
+std::vector<std::uint32_t> rank_images(const Problem& p, const ByPoint& by_point) {
+  constexpr std::size_t kFewImages = 1024, kObservations = std::size_t{1} << 22;
+  const std::size_t images = p.num_images();
+  if (images < kFewImages) return {};
+  // A part of the points tells as much as all.
+  const std::uint64_t stride = 1 + by_point.first.back() / kObservations;
+  std::vector<std::uint64_t> first(images + 1, 0);
+  const auto for_each_sample = [&](const auto& visit) {
+    for (std::size_t j = 0; j < p.num_points(); j += stride)
+      for (std::uint64_t i = by_point.first[j]; i < by_point.first[j + 1]; ++i)
+        visit(p.observation_image[by_point.at(i)], static_cast<std::uint32_t>(j));
+  };
+  for_each_sample([&](std::uint32_t image, std::uint32_t) { ++first[image + 1]; });
+  for (std::size_t i = 0; i < images; ++i) first[i + 1] += first[i];
+  std::vector<std::uint64_t> next(first.begin(), first.end() - 1);
+  Buffer<std::uint32_t> points(first.back());
+  for_each_sample([&](std::uint32_t image, std::uint32_t point) { points[next[image]++] = point; });
+
+  std::vector<std::uint32_t> walk, rank(images, UINT32_MAX);
+  std::vector<bool> passed(p.num_points(), false);
+  const auto reach = [&](std::uint32_t image) {
+    if (rank[image] != UINT32_MAX) return;
+    rank[image] = static_cast<std::uint32_t>(walk.size());
+    walk.push_back(image);
+  };
+  std::size_t at = 0;
+  for (std::uint32_t start = 0; start < images; ++start) {
+    reach(start);
+    for (; at < walk.size(); ++at)
+      for (std::uint64_t k = first[walk[at]]; k < first[walk[at] + 1]; ++k) {
+        const std::uint32_t point = points[k];
+        if (passed[point]) continue;
+        passed[point] = true;
+        for (std::uint64_t i = by_point.first[point]; i < by_point.first[point + 1]; ++i)
+          reach(p.observation_image[by_point.at(i)]);
+      }
+  }
+  return rank;
+}
+
 struct KeyedPoint {
   std::uint64_t key;
   std::uint32_t point;
@@ -76,6 +119,8 @@ Buffer<KeyedPoint> order_points(const Problem& p, const ByPoint& by_point) {
   const int bits = std::max(1, static_cast<int>(std::bit_width(p.num_images() - 1)));
   constexpr int kLengthBits = 20;
   const int leading = std::max(1, (64 - kLengthBits) / bits);
+  const std::vector<std::uint32_t> rank = rank_images(p, by_point);
+  const auto place = [&](std::uint32_t image) { return rank.empty() ? image : rank[image]; };
   std::size_t seen = 0;
   for (std::size_t j = 0; j < p.num_points(); ++j)
     seen += by_point.first[j + 1] > by_point.first[j];
@@ -87,7 +132,7 @@ Buffer<KeyedPoint> order_points(const Problem& p, const ByPoint& by_point) {
     std::uint64_t key = std::min<std::uint64_t>(track, (1u << kLengthBits) - 1);
     for (int o = 0; o < leading; ++o) {
       const bool has = static_cast<std::uint64_t>(o) < track;
-      key = (key << bits) | (has ? p.observation_image[by_point.at(begin + o)] : 0);
+      key = (key << bits) | (has ? place(p.observation_image[by_point.at(begin + o)]) : 0);
     }
     items[seen++] = {key, static_cast<std::uint32_t>(j)};
   }

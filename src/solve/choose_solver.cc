@@ -29,6 +29,18 @@ Plan asked_for(const WorkCounts& counts, CameraSolverKind kind) {
   return {cheaper_iterative(counts), asked + ", " + plan.reason};
 }
 
+bool takes_mixed(SolverKind kind, Precision precision) {
+  switch (precision) {
+    case Precision::full:
+      return false;
+    case Precision::mixed:
+      return has_mixed(kind);
+    case Precision::automatic:
+      break;
+  }
+  return prefers_mixed(kind);
+}
+
 std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 999999) / 1000000) + " MB";
 }
@@ -45,19 +57,22 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
                                        " times; solvers that form the camera matrix take at most " +
                                        std::to_string(Chunks::kLongestTrack) +
                                        ": use the implicit iterative solver");
-  const auto forecast = [&](SolverKind kind) {
-    return resident_bytes + forecast_bytes(counts, kind, threads);
+  const auto forecast = [&](const Plan& plan) {
+    return resident_bytes + forecast_bytes(counts, plan, threads);
   };
-  choice.forecast_bytes = forecast(choice.plan.kind);
+  choice.plan.mixed = takes_mixed(choice.plan.kind, options.precision);
+  choice.forecast_bytes = forecast(choice.plan);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
-  const std::uint64_t lean = forecast(SolverKind::implicit_cg);
+  Plan leanest{SolverKind::implicit_cg, "",
+               takes_mixed(SolverKind::implicit_cg, options.precision)};
+  const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
       lean <= options.memory_limit_bytes) {
-    choice.plan = {SolverKind::implicit_cg, std::string(to_string(choice.plan.kind)) +
-                                                " would need " + megabytes(choice.forecast_bytes) +
-                                                ", over the limit of " +
-                                                megabytes(options.memory_limit_bytes)};
+    leanest.reason = std::string(to_string(choice.plan.kind)) + " would need " +
+                     megabytes(choice.forecast_bytes) + ", over the limit of " +
+                     megabytes(options.memory_limit_bytes);
+    choice.plan = leanest;
     choice.forecast_bytes = lean;
     return choice;
   }

@@ -93,6 +93,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   if (!choice.ok()) return choice.error();
   summary.solver = to_string(choice.value().plan.kind);
   summary.solver_reason = choice.value().plan.reason;
+  summary.precision = choice.value().plan.mixed ? "mixed" : "double";
   summary.forecast_bytes = choice.value().forecast_bytes;
   summary.simd = kernels.name;
   summary.loss = options.loss.kind;
@@ -101,8 +102,8 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
 
   const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
                          options.inner_iterations};
-  BundleSystem system(problem, std::move(batches), std::move(columns), rules,
-                      choice.value().plan.kind, kernels, threads);
+  BundleSystem system(problem, std::move(batches), std::move(columns), rules, choice.value().plan,
+                      kernels, threads);
   if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
   summary.setup_s = clock.seconds();
   SolveOptions resolved = options;

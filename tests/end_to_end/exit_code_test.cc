@@ -55,8 +55,23 @@ TEST_P(UsageErrors, ExitWithTwoAndNameWhatIsAccepted) {
 INSTANTIATE_TEST_SUITE_P(
     Command, UsageErrors,
     testing::Values(
-        WrongUsage{{}, {"solve", "info", "convert", "generate", "demo"}},
-        WrongUsage{{"refine"}, {"solve", "info", "convert", "generate", "demo"}},
+        WrongUsage{
+            {}, {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"}},
+        WrongUsage{
+            {"refine"},
+            {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"}},
+        WrongUsage{{"perturb", "tiny.txt"}, {"OUT"}},
+        WrongUsage{{"perturb", "tiny.txt", "o.txt", "--outliers", "1.5"}, {"from 0 to 1"}},
+        WrongUsage{{"perturb", "tiny.txt", "o.txt", "--point", "-1"}, {"from 0 up"}},
+        WrongUsage{{"perturb", "tiny.txt", "o.txt", "--intrinsics", "1,,2"}, {"F[,K1[,K2]]"}},
+        WrongUsage{{"perturb", "tiny.txt", "o.txt", "--protocol", "noise"}, {"rootba"}},
+        WrongUsage{{"perturb", "tiny.txt", "o.txt", "--protocol", "ceres", "--center", "1"},
+                   {"sigma is that of t"}},
+        WrongUsage{{"evaluate", "tiny.txt"}, {"REF"}},
+        WrongUsage{{"compare", "tiny.txt", "--runs", "0"}, {"from 1 up"}},
+        WrongUsage{{"compare", "tiny.txt", "--time-to", "0.1,x"}, {"above 0"}},
+        WrongUsage{{"compare", "tiny.txt", "--solvers", ",sheaf"}, {"NAME[:CONFIG]"}},
+        WrongUsage{{"evaluate", "tiny.txt", "tiny.txt", "--no-align", "--robust"}, {"--no-align"}},
         WrongUsage{{"solve"}, {"IN"}}, WrongUsage{{"convert", "tiny.txt"}, {"OUT"}},
         WrongUsage{{"solve", "tiny.txt", "--los", "huber"}, {"--los"}},
         WrongUsage{{"solve", "tiny.txt", "--cheirality", "ignore"},

@@ -24,10 +24,19 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
   if (verb == "demo") options.insert("--ply");
+  if (verb == "compare")
+    options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
+                    "--time-to", "--runs", "--plot"});
+  if (verb == "info") options.insert("--pattern");
+  if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
+  if (verb == "perturb")
+    options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
+                    "--outliers", "--outlier-size", "--seed", "--protocol", "--normalize",
+                    "--min-depth"});
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
                     "--loss", "--cheirality", "--fix", "--solver", "--memory-limit",
-                    "--initial-damping", "--inner-iterations", "--simd"});
+                    "--initial-damping", "--inner-iterations", "--simd", "--precision"});
   return options;
 }
 
@@ -75,14 +84,16 @@ TEST_P(Help, ExampleRuns) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
-                         testing::Values("solve", "info", "convert", "generate", "demo"),
+                         testing::Values("solve", "info", "convert", "perturb", "evaluate",
+                                         "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "convert", "generate", "demo"})
+  for (const char* verb :
+       {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

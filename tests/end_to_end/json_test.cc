@@ -42,10 +42,13 @@ bool has_keys(const json& value, const std::set<std::string>& keys) {
 
 bool is_list(const json& value) { return has_keys(value, {"count", "first"}); }
 
-bool is_errors(const json& value) {
-  if (!has_keys(value, {"aligned", "scale", "rotation_error_rad", "translation_error",
-                        "center_error", "point_error"}))
-    return false;
+// Exactly an object of errors, or with other keys beside.
+bool is_errors(const json& value, bool and_more = false) {
+  const std::set<std::string> keys = {"aligned",           "scale",        "rotation_error_rad",
+                                      "translation_error", "center_error", "point_error"};
+  if (!and_more && !has_keys(value, keys)) return false;
+  for (const std::string& key : keys)
+    if (!value.contains(key)) return false;
   for (const char* kind :
        {"rotation_error_rad", "translation_error", "center_error", "point_error"})
     if (!has_keys(value[kind], {"mean", "median", "rms", "max"})) return false;
@@ -97,8 +100,11 @@ TEST_F(JsonTest, SolveHasTheDocumentedKeys) {
 }
 
 TEST_F(JsonTest, InfoHasTheDocumentedKeys) {
-  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json", "--pattern", "p.png"}).exit_code, 0);
   expect_documented("info", {kShared, "info"});
+  EXPECT_EQ(contents_of(folder_ / "p.png").rfind("\x89PNG", 0), 0u);
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
+  EXPECT_TRUE(json_of(folder_ / "info.json")["pattern"].is_null());
 }
 
 TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
@@ -109,6 +115,28 @@ TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
 }
 
 TEST_F(JsonTest, GenerateHasTheDocumentedKeys) { expect_documented("generate", {"generate"}); }
+
+TEST_F(JsonTest, PerturbHasTheDocumentedKeys) {
+  ASSERT_EQ(
+      run({"perturb", "in.txt", "o.txt", "--json", "perturb.json", "--outliers", "0.1"}).exit_code,
+      0);
+  expect_documented("perturb", {kShared, "perturb"});
+}
+
+TEST_F(JsonTest, EvaluateHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"evaluate", "in.txt", "in.txt", "--json", "evaluate.json"}).exit_code, 0);
+  expect_documented("evaluate", {"evaluate"});
+  EXPECT_TRUE(is_errors(json_of(folder_ / "evaluate.json"), true));
+}
+
+TEST_F(JsonTest, CompareHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"compare", "in.txt", "--json", "compare.json", "--solvers", "sheaf,nobody",
+                 "--reference", "in.txt"})
+                .exit_code,
+            0);
+  expect_documented("compare", {"compare"});
+  EXPECT_TRUE(is_errors(json_of(folder_ / "compare.json")["runs"][0]["errors"]));
+}
 
 TEST_F(JsonTest, DemoHasTheDocumentedKeys) {
   ASSERT_EQ(run({"demo", "--points", "400", "--json", "demo.json"}).exit_code, 0);
@@ -136,6 +164,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                  "reject",
                  "--solver",
                  "dense",
+                 "--precision",
+                 "double",
                  "--initial-damping",
                  "0.01",
                  "--time-limit",
@@ -149,6 +179,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"loss", "none"},
                                 {"cheirality", "reject"},
                                 {"fix", {"k1", "pose=0"}},
+                                {"precision", "double"},
                                 {"solver", "dense"},
                                 {"memory_limit_bytes", 0},
                                 {"initial_damping", 0.01},

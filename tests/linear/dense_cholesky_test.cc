@@ -66,6 +66,36 @@ TEST(DenseCholesky, SameBitsForAnyThreadCount) {
   }
 }
 
+// From a thousand columns on the matrix is updated in wider steps.
+TEST(DenseCholesky, SolvesLargeMatricesWithTheSameBits) {
+  const auto entry = [](std::size_t i, std::size_t j) {
+    return i == j ? 2000.0 : std::sin(static_cast<double>(i * 31 + j * 17));
+  };
+  for (std::size_t n : {1001u, 1507u}) {
+    std::vector<std::vector<double>> solutions;
+    for (int count : {1, 2, 5}) {
+      Threads threads(count);
+      DenseCholesky cholesky(n, available_kernels().front()->name);
+      cholesky.clear(threads);
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j <= i; ++j) cholesky.at(i, j) = entry(i, j);
+      ASSERT_TRUE(cholesky.factor(threads));
+      Buffer<double> x((n + 7) / 8 * 8);
+      x.fill(1);
+      cholesky.solve(x.data());
+      solutions.emplace_back(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(n));
+    }
+    EXPECT_EQ(solutions[1], solutions[0]);
+    EXPECT_EQ(solutions[2], solutions[0]);
+    for (std::size_t i = 0; i < n; ++i) {
+      double sum = 0;
+      for (std::size_t j = 0; j < n; ++j)
+        sum += entry(std::max(i, j), std::min(i, j)) * solutions[0][j];
+      ASSERT_NEAR(sum, 1, 1e-12) << i;
+    }
+  }
+}
+
 TEST(DenseCholesky, RefusesWhatIsNotPositiveDefinite) {
   Threads threads(1);
   for (double bad : {0.0, -1.0, std::nan(""), double(INFINITY)}) {

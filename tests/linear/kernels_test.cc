@@ -17,7 +17,7 @@ namespace {
 
 /// Everything that the kernels produce from one state.
 struct Outcome {
-  Buffer<double> tiles, diagonal, factors, trial_points, product, weights, residuals;
+  Buffer<double> tiles, diagonal, factors, trial_points, product, float_product, weights, residuals;
   EliminateOutput eliminated{};
   TrialOutput trial{};
   double square_sum = 0;
@@ -40,6 +40,25 @@ class KernelsTest : public ::testing::Test {
     batches_ = arrange(problem);
     chunks_ = cut_into_chunks(batches_, 9, lists);
     fill(problem);
+  }
+
+  /// The cameras as the single precision product has them: lengths after (X - origin) scale.
+  Buffer<float> float_cameras(const double* origin, double scale) const {
+    const std::size_t images = cameras_.size() / kCameraRecord;
+    Buffer<float> out(kFloatCameraRecord * images);
+    out.fill(0);
+    for (std::size_t i = 0; i < images; ++i) {
+      const double* c = &cameras_[kCameraRecord * i];
+      float* to = &out[kFloatCameraRecord * i];
+      for (std::size_t k = 0; k < kCameraRecord; ++k) to[k] = static_cast<float>(c[k]);
+      for (int k = 0; k < 3; ++k) {
+        const double* R = c + 3 * k;
+        const double t = c[9 + k] + R[0] * origin[0] + R[1] * origin[1] + R[2] * origin[2];
+        to[9 + k] = static_cast<float>(scale * t);
+        to[18 + k] = static_cast<float>(scale * c[18 + k]);
+      }
+    }
+    return out;
   }
 
   void fill(const Problem& problem) {
@@ -105,7 +124,20 @@ class KernelsTest : public ::testing::Test {
     const ProductInput product{&batches_, cameras_.data(), points_.data(), out.factors.data(),
                                out.weights.data()};
     out.residuals.allocate(16 * batches_.num_batches());
+    out.float_product.allocate(out.product.size());
+    out.float_product.fill(0);
+    const double origin[3] = {0.3, -0.2, 5};
+    const Buffer<float> rounded = float_cameras(origin, 0.125);
+    const FloatProductInput single{&batches_,
+                                   rounded.data(),
+                                   points_.data(),
+                                   out.factors.data(),
+                                   {origin[0], origin[1], origin[2]},
+                                   0.125,
+                                   out.weights.data()};
     for (const Chunk& chunk : chunks_.chunks) {
+      kernels.product_float(single, chunk, reinterpret_cast<float*>(saved.data()),
+                            out.float_product.data());
       kernels.product(product, chunk, saved.data(), out.product.data());
       kernels.trial(trial, chunk, out.trial);
       kernels.residuals(batches_, cameras_.data(), points_.data(), chunk,
@@ -139,6 +171,18 @@ void expect_close(const Buffer<double>& a, const Buffer<double>& b, double toler
     ASSERT_NEAR(a[i], b[i], tolerance * (std::abs(b[i]) + 1e-6 * scale)) << what << " " << i;
 }
 
+/// Column by column against the largest of any image: rounding to float is relative to the terms of
+/// a sum, not to what is left of them.
+void expect_close_by_column(const Buffer<double>& a, const Buffer<double>& b, double tolerance) {
+  for (std::size_t k = 0; k < 9; ++k) {
+    double scale = 0;
+    for (std::size_t i = k; i < b.size(); i += kProductRecord)
+      scale = std::max(scale, std::abs(b[i]));
+    for (std::size_t i = k; i < b.size(); i += kProductRecord)
+      ASSERT_NEAR(a[i], b[i], tolerance * scale) << "column " << k << " at " << i;
+  }
+}
+
 /// The entries that mean something: 83 of a tile's 88 doubles and 91 of a diagonal block's 96 are
 /// sums; lanes beyond a group's points are padding.
 void clear_padding(const Batches& batches, Outcome& o) {
@@ -167,6 +211,7 @@ void KernelsTest::expect_agreement(double slack) {
     near(got.eliminated.loss_sum, expected.eliminated.loss_sum);
     near(got.trial.loss_sum, expected.trial.loss_sum);
     expect_close(got.product, expected.product, 1e-7, "product");
+    expect_close_by_column(got.float_product, expected.float_product, 1e-5);
     expect_close(got.trial_points, expected.trial_points, slack * 1e-11, "trial point");
     near(got.eliminated.square_sum, expected.eliminated.square_sum);
     near(got.eliminated.point_decrease, expected.eliminated.point_decrease);
@@ -247,6 +292,22 @@ TEST_F(KernelsTest, InnerIterationsEndAtEachPointsOwnMinimum) {
   EXPECT_NEAR(again.trial.square_sum, there.trial.square_sum, 1e-4 * there.trial.square_sum);
 }
 
+// The moved, scaled and rounded scene has the product of the scene: the two are compared after the
+// lengths are taken back.
+TEST_F(KernelsTest, TheProductInSinglePrecisionIsTheProduct) {
+  make(false, ChunkLists::none);
+  for (const ScaledLoss& loss : {ScaledLoss(), ScaledLoss{LossKind::cauchy, 5}}) {
+    loss_ = loss;
+    for (const Kernels* kernels : available_kernels()) {
+      SCOPED_TRACE(std::string(kernels->name) + ", loss " + to_string(loss.kind));
+      Outcome got = run(*kernels);
+      for (std::size_t i = 0; i < got.float_product.size(); ++i)
+        if (i % kProductRecord < 3) got.float_product[i] *= 0.125;
+      expect_close_by_column(got.float_product, got.product, 1e-5);
+    }
+  }
+}
+
 TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
   make(false, ChunkLists::pairs);
   std::vector<const Kernels*> fused;
@@ -269,6 +330,7 @@ TEST_F(KernelsTest, InstructionSetsWithFusedMultiplyAddAgreeBitForBit) {
       EXPECT_TRUE(same(first.factors, other.factors));
       EXPECT_TRUE(same(first.trial_points, other.trial_points));
       EXPECT_TRUE(same(first.product, other.product));
+      EXPECT_TRUE(same(first.float_product, other.float_product));
       EXPECT_EQ(first.trial.square_sum, other.trial.square_sum);
       EXPECT_EQ(first.eliminated.square_sum, other.eliminated.square_sum);
       EXPECT_EQ(first.eliminated.loss_sum, other.eliminated.loss_sum);

@@ -16,6 +16,7 @@ namespace {
 struct Case {
   CameraSolverKind solver;
   const char* name;
+  Precision precision = Precision::full;
 };
 
 class Solvers : public testing::TestWithParam<Case> {
@@ -32,9 +33,11 @@ class Solvers : public testing::TestWithParam<Case> {
     options.fixed = fixed;
     options.loss = loss;
     options.solver = CameraSolverKind::dense;
+    options.precision = Precision::full;
     Problem reference = start;
     const double expected = solve(reference, options).final_cost;
     options.solver = GetParam().solver;
+    options.precision = GetParam().precision;
     Problem problem = start;
     const Summary s = solve(problem, options);
     EXPECT_TRUE(s.usable()) << s.words;
@@ -98,6 +101,7 @@ TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
   const Problem start = generate(scene).value().start;
   SolveOptions options;
   options.solver = GetParam().solver;
+  options.precision = GetParam().precision;
   options.max_iterations = 4;
   for (const Loss& loss : {Loss(), Loss(Cauchy())}) {
     options.loss = loss;
@@ -114,12 +118,15 @@ TEST_P(Solvers, GiveTheSameBitsOnAnyThreads) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Camera, Solvers,
-                         testing::Values(Case{CameraSolverKind::dense, "Dense"},
-                                         Case{CameraSolverKind::iterative, "Iterative"},
-                                         Case{CameraSolverKind::iterative_explicit, "Explicit"},
-                                         Case{CameraSolverKind::iterative_implicit, "Implicit"}),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Camera, Solvers,
+    testing::Values(Case{CameraSolverKind::dense, "Dense"},
+                    Case{CameraSolverKind::iterative, "Iterative"},
+                    Case{CameraSolverKind::iterative_explicit, "Explicit"},
+                    Case{CameraSolverKind::iterative_implicit, "Implicit"},
+                    Case{CameraSolverKind::iterative_explicit, "ExplicitMixed", Precision::mixed},
+                    Case{CameraSolverKind::iterative_implicit, "ImplicitMixed", Precision::mixed}),
+    [](const auto& info) { return info.param.name; });
 
 /// Long enough for a coarse space of some twenty clusters.
 Problem street() {

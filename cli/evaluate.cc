@@ -1,0 +1,102 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "errors_document.h"
+#include "interrupt.h"
+#include "io/output_file.h"
+#include "json_document.h"
+#include "outputs.h"
+#include "report/errors.h"
+#include "sheaf/sheaf.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  std::string estimate, reference, csv;
+  bool no_align = false, robust = false;
+};
+
+void write_csv(const ErrorLists& lists, const std::string& path) {
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(errors_csv(lists));
+  file.value().commit().value();
+}
+
+Json alignment_json(const StateAlignment& a) {
+  if (!a.aligned) return {};
+  return {{"rotation", a.similarity.rotation},
+          {"translation", a.similarity.translation},
+          {"by", a.by_points ? "points" : "centers"},
+          {"places", a.places},
+          {"inliers", a.inliers}};
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const std::string& json = arguments.common.json;
+  check_outputs({{"--csv", arguments.csv}, {"--json", json}});
+  const ReadOptions hash{.hash = !json.empty()};
+  const InputFile estimate = read_file(arguments.estimate, hash).value();
+  const InputFile reference = read_file(arguments.reference, hash).value();
+  const AlignBy align_by = arguments.no_align ? AlignBy::nothing
+                           : arguments.robust ? AlignBy::robust
+                                              : AlignBy::least_squares;
+  const ErrorLists lists = list_errors(estimate.problem, reference.problem, align_by).value();
+  if (!arguments.no_align && !lists.alignment.aligned && !arguments.common.quiet)
+    std::fputs("neither camera centres nor points determine an alignment: compared as they are\n",
+               stderr);
+  interrupt.begin_write();
+  if (!arguments.csv.empty()) write_csv(lists, arguments.csv);
+  fmt::print("{} against {}: {}\n{}", arguments.estimate, arguments.reference,
+             counts_text(estimate.problem), errors_text(lists));
+  if (json.empty()) return 0;
+  Json document = {{"version", SHEAF_VERSION},
+                   {"estimate", input_json(arguments.estimate, estimate)},
+                   {"reference", input_json(arguments.reference, reference)}};
+  document.update(errors_json(summarise(lists)));
+  document["alignment"] = alignment_json(lists.alignment);
+  document["time"] = {{"read_s", estimate.read_s + reference.read_s}, {"total_s", total.seconds()}};
+  write_json(document, json);
+  return 0;
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb = *app.add_subcommand(
+      "evaluate", "how far an estimate's poses and points are from a reference");
+  verb.add_option("EST", arguments->estimate, "estimate: BAL, plain or .gz or .bz2")
+      ->type_name("FILE")
+      ->required();
+  verb.add_option("REF", arguments->reference,
+                  "reference with the same images and points; lengths are in its units")
+      ->type_name("FILE")
+      ->required();
+  CLI::Option* raw = verb.add_flag("--no-align", arguments->no_align,
+                                   "compare as they are; otherwise the Sim(3) that brings the "
+                                   "camera centres together best is applied first");
+  verb.add_flag("--robust", arguments->robust, "align so that images that are far off do not count")
+      ->excludes(raw);
+  verb.add_option("--csv", arguments->csv, "also write each image's errors")->type_name("FILE");
+  add_common_options(verb, arguments->common);
+  verb.footer(
+      "Example:\n  sheaf evaluate problem.txt problem.txt --csv errors.csv\n"
+      "\nHow far a solution is from the truth of a generated scene:\n"
+      "  sheaf evaluate refined.txt truth.txt --json errors.json");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

@@ -1,0 +1,125 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "interrupt.h"
+#include "json_document.h"
+#include "noise_arguments.h"
+#include "outputs.h"
+#include "sheaf/sheaf.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  NoiseArguments noise;
+  std::string in, out;
+};
+
+/// What the noise did to a problem.
+struct Effect {
+  NoiseRecord record;
+  Evaluation before, after;
+};
+
+void print(const Arguments& arguments, const Problem& problem, const NoiseOptions& noise,
+           const Effect& effect) {
+  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
+  if (noise.normalize_to > 0) {
+    const auto& [center, scale] = effect.record.normalization;
+    fmt::print("normalised  moved by {:.6g} {:.6g} {:.6g}, scaled by {:.6g}\n", -center[0],
+               -center[1], -center[2], scale);
+  }
+  fmt::print("noise       {}\n", noise_text(noise));
+  if (!effect.record.outliers.empty())
+    fmt::print("outliers    {} observations moved by {:.6g} px\n", effect.record.outliers.size(),
+               noise.outlier_px);
+  if (noise.least_depth > 0)
+    fmt::print("left out    {} observations and {} points nearer than {:.6g}\n",
+               effect.record.dropped_observations, effect.record.dropped_points, noise.least_depth);
+  fmt::print("cost        {:.9e} -> {:.9e}\n", effect.before.cost, effect.after.cost);
+  fmt::print("rms         {:.6g} -> {:.6g} px\n", effect.before.rms_px, effect.after.rms_px);
+  fmt::print("wrote       {}\n", arguments.out);
+}
+
+Json document_of(const Arguments& arguments, const NoiseOptions& noise, const Json& input,
+                 const Problem& problem, const Effect& effect) {
+  const NoiseRecord& record = effect.record;
+  Json normalization;
+  if (noise.normalize_to > 0)
+    normalization = {{"center", record.normalization.center},
+                     {"scale", record.normalization.scale}};
+  std::error_code ignored;
+  Json document = {{"version", SHEAF_VERSION}, {"input", input}};
+  document["options"] = noise_json(noise);
+  document["output"] = {{"path", arguments.out},
+                        {"bytes", std::filesystem::file_size(arguments.out, ignored)}};
+  document["output"].update(counts_json(problem));
+  document["normalization"] = normalization;
+  document["outliers"] = observations_json(record.outliers, problem);
+  document["dropped"] = {{"observations", record.dropped_observations},
+                         {"points", record.dropped_points}};
+  document["cost"] = {{"before", number(effect.before.cost)}, {"after", number(effect.after.cost)}};
+  document["rms_px"] = {{"before", number(effect.before.rms_px)},
+                        {"after", number(effect.after.rms_px)}};
+  return document;
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const std::string& json = arguments.common.json;
+  check_outputs({{"OUT", arguments.out}, {"--json", json}});
+  const NoiseOptions noise = noise_options(arguments.noise);
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const Json before = input_json(arguments.in, input);
+  Effect effect;
+  effect.before = evaluate(input.problem);
+  effect.record = perturb(input.problem, noise).value();
+  effect.after = evaluate(input.problem);
+  interrupt.begin_write();
+  const Timer writing;
+  write(input.problem, arguments.out).value();
+  const double write_s = writing.seconds();
+  print(arguments, input.problem, noise, effect);
+  if (json.empty()) return 0;
+  Json document = document_of(arguments, noise, before, input.problem, effect);
+  document["time"] = {{"read_s", input.read_s}, {"write_s", write_s}, {"total_s", total.seconds()}};
+  write_json(document, json);
+  return 0;
+}
+
+}  // namespace
+
+void add_perturb(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb = *app.add_subcommand("perturb", "add noise and outliers to a problem");
+  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
+      ->type_name("FILE")
+      ->required();
+  verb.add_option("OUT", arguments->out,
+                  "the disturbed problem; NAME.ply is a point cloud with cameras, anything else "
+                  "BAL, NAME.gz and NAME.bz2 compressed")
+      ->type_name("FILE")
+      ->required();
+  add_noise_options(verb, arguments->noise);
+  add_common_options(verb, arguments->common);
+  verb.footer(
+      "Example:\n  sheaf perturb problem.txt start.txt --rotation 0.01 --center 0.05 --pixel 0.5 "
+      "--seed 7\n"
+      "\nAs rootba's published experiments start (the numbers drawn are Sheaf's own):\n"
+      "  sheaf perturb problem.txt start.txt --protocol rootba\n"
+      "\nEvery tenth measurement wrong by 50 px:\n"
+      "  sheaf perturb problem.txt start.txt --outliers 0.1 --outlier-size 50");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

@@ -1,0 +1,45 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "linear/camera_solver.h"
+#include "linear/conjugate_gradients.h"
+
+namespace sheaf {
+
+/// S x with Jacobians recomputed in single precision; the sums over an image's observations are
+/// double. The scene is moved and scaled, and x is scaled by its columns, before either is rounded:
+/// the result depends on no unit and on no origin.
+class FloatImplicitOperator : public ImageOperator {
+ public:
+  FloatImplicitOperator(const Columns& columns, const HeldState& state, const Kernels& kernels,
+                        Threads& threads);
+
+  /// Takes the held state, and diag(J^T J) by column to scale x with.
+  void prepare(const double* squares);
+  void apply(const double* x, double* y) override;
+  std::uint64_t bytes() const;
+
+ private:
+  double scale_of_step(const double* x) const;
+  void write_step(const double* x, double scale, std::size_t image);
+  void add_slices(std::size_t image, double scale, double* y);
+  template <class Task>
+  void for_each_image(const Task& task);
+
+  const Columns& columns_;
+  HeldState state_;
+  const Kernels& kernels_;
+  Threads& threads_;
+  std::size_t images_, slices_;
+  double origin_[3] = {0, 0, 0}, scale_ = 1;
+  const double* squares_ = nullptr;
+  Buffer<float> cameras_;  ///< kFloatCameraRecord per image
+  Buffer<double> sums_;    ///< kProductRecord per image, one set per slice
+  std::vector<Buffer<double>> saved_;
+};
+
+}  // namespace sheaf
