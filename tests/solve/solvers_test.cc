@@ -75,6 +75,29 @@ TEST_P(Solvers, AgreeWithALoss) {
   expect_same_optimum(on_true_points, points_held(), Huber{1});
 }
 
+// The end would be the same with weights left out of the floats, as the last steps are in double;
+// the first one would not.
+TEST_P(Solvers, StepAlikeInEitherPrecisionWithALoss) {
+  SolveOptions options;
+  options.solver = GetParam().solver;
+  options.inner_iterations = 0;
+  options.max_iterations = 1;
+  for (const Loss& loss : {Loss(Huber{0.5}), Loss(Cauchy{0.5})}) {
+    options.loss = loss;
+    double cost[2] = {0, 0};
+    for (Precision precision : {Precision::full, GetParam().precision}) {
+      options.precision = precision;
+      Problem problem = small_scene().start;
+      const Summary s = solve(problem, options);
+      cost[precision == Precision::full ? 0 : 1] = s.iterations.back().trial_cost;
+      EXPECT_LT(s.final_cost, s.initial_cost);
+    }
+    if (GetParam().precision != Precision::full) {
+      EXPECT_NEAR(cost[1], cost[0], 1e-4 * cost[0]);
+    }
+  }
+}
+
 TEST_P(Solvers, AgreeOnSharedLenses) {
   for (std::uint32_t together : {2u, 12u})
     for (bool keep_unused : {false, true}) {
