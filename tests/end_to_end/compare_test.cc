@@ -86,13 +86,13 @@ TEST_F(CompareCommand, RunsSheafInSeveralModes) {
 }
 
 TEST_F(CompareCommand, HasTheDocumentedRowForAPeer) {
-  add_honest_peer("ceres-9", start_cost_);
-  // "ceres" stands for every program whose name begins so.
-  const Outcome outcome = run({"compare", "in.txt", "--solvers", "sheaf,ceres:words-of-it",
+  add_honest_peer("abacus-9", start_cost_);
+  // "abacus" stands for every program whose name begins so.
+  const Outcome outcome = run({"compare", "in.txt", "--solvers", "sheaf,abacus:words-of-it",
                                "--peers", "peers", "--json", "c.json", "--threads", "1"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const json document = json_of(folder_ / "c.json");
-  const json& peer = run_of(document, "ceres-9");
+  const json& peer = run_of(document, "abacus-9");
   EXPECT_EQ(peer["config"], "words-of-it");
   EXPECT_EQ(peer["accepted"], 2);
   EXPECT_EQ(peer["rejected"], 1);
