@@ -50,9 +50,10 @@ void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
 
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 
-/// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair, 7 ns an
-/// observation for an implicit product, 12 ns a block for an explicit one, 200 ns to place a tile.
-constexpr double kPairNs = 4.5, kImplicitNs = 7, kBlockNs = 12, kPlaceNs = 200,
+/// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair and, spread
+/// over half a dozen steps, as much to have listed it; 5.5 ns an observation for an implicit
+/// product in mixed precision, 12 ns a block for an explicit one, 200 ns to place a tile.
+constexpr double kPairNs = 8, kImplicitNs = 5.5, kBlockNs = 12, kPlaceNs = 200,
                  kDenseFlopsPerNs = 85;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
@@ -67,7 +68,7 @@ double coarse_seconds(const WorkCounts& c) {
 
 /// S's blocks as slices of sums: multiplied into, and 704 bytes of each cleared, added to and
 /// summed, which for many slices outweighs the products.
-constexpr double kSliceTileNs = 200;
+constexpr double kSliceTileNs = 400;
 double forming_seconds(const WorkCounts& c) {
   const int slices = count_slices(linearize_flops(c.batches, c.pairs), c.tiles, c.images);
   return seconds(kPairNs * static_cast<double>(c.pairs) +
@@ -93,6 +94,9 @@ double implicit_seconds(const WorkCounts& c) {
   return coarse_seconds(c) +
          seconds(iterations(c) * kImplicitNs * static_cast<double>(c.observations));
 }
+
+/// Seconds a step.
+constexpr double kWorthIterating = 1e-3;
 
 std::string milliseconds(double s) {
   return std::to_string(static_cast<long>(1e3 * s + 0.5)) + " ms";
@@ -152,10 +156,10 @@ Plan plan_solver(const WorkCounts& c) {
                             " iterative explicit, " + milliseconds(implicit_cg) +
                             " iterative implicit";
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
-  if (sparse < dense && sparse <= explicit_cg && sparse <= implicit_cg && !too_long)
-    return {SolverKind::sparse, counts + costs};
-  if (dense <= explicit_cg && dense <= implicit_cg && !too_long)
-    return {SolverKind::dense, counts + costs};
+  // Exact steps are fewer: conjugate gradients must save something that can be felt.
+  const double iterative = std::min(explicit_cg, implicit_cg) + kWorthIterating;
+  if (std::min(dense, sparse) <= iterative && !too_long)
+    return {sparse < dense ? SolverKind::sparse : SolverKind::dense, counts + costs};
   if (explicit_cg <= implicit_cg && !too_long) return {SolverKind::explicit_cg, counts + costs};
   return {SolverKind::implicit_cg, counts + costs};
 }
