@@ -80,9 +80,9 @@ HWY_INLINE hn::Vec<DF> load_blocks(DF d, const float* const* from) {
   } else if constexpr (hn::MaxLanes(DF()) == 8) {
     return hn::ConcatUpperLower(d, hn::LoadDup128(d, from[1]), hn::LoadDup128(d, from[0]));
   } else {
-    const auto low = hn::OddEvenBlocks(hn::LoadDup128(d, from[1]), hn::LoadDup128(d, from[0]));
-    const auto high = hn::OddEvenBlocks(hn::LoadDup128(d, from[3]), hn::LoadDup128(d, from[2]));
-    return hn::ConcatUpperLower(d, high, low);
+    const hn::Half<DF> half;
+    const float* const upper[2] = {from[2], from[3]};
+    return hn::Combine(d, load_blocks(half, upper), load_blocks(half, from));
   }
 }
 #endif
