@@ -134,7 +134,8 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
     const double* z = &batches.xy[16 * b + lane];
     if (kLinearize) {
       LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), nullptr);
-      square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
+      // Summed as below: which way a lane goes depends on its neighbours, its bits must not.
+      square = hn::Add(square, fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
       if constexpr (Robust) cost = hn::Add(cost, apply_loss(in.loss, j).value);
       sums.add(j);
     } else {
