@@ -16,6 +16,7 @@ import json
 import math
 import os
 import platform
+import re
 import resource
 import signal
 import subprocess
@@ -187,8 +188,10 @@ def curves(document):
 
 
 def plot_name(document):
+    """cost-dubrovnik-16-1.svg: the problem by its family and number of images, and the threads."""
     stem = os.path.splitext(document["problem"])[0]
-    return f"{stem}-{document['threads']}.svg"
+    short = re.match(r"[a-z]+-\d+(?=-\d+-pre$)", stem)
+    return f"cost-{short.group() if short else stem}-{document['threads']}.svg"
 
 
 def write_results(results, out):

@@ -51,8 +51,8 @@ void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 
 /// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair and, spread
-/// over half a dozen steps, as much to have listed it; 5.5 ns an observation for an implicit
-/// product in mixed precision, 12 ns a block for an explicit one, 200 ns to place a tile.
+/// over half a dozen steps, nearly as much to have listed it; 5.5 ns an observation for an implicit
+/// product in mixed precision, 12 ns a block for an explicit one. To place a tile: a guess.
 constexpr double kPairNs = 8, kImplicitNs = 5.5, kBlockNs = 12, kPlaceNs = 200,
                  kDenseFlopsPerNs = 85;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
@@ -67,7 +67,8 @@ double coarse_seconds(const WorkCounts& c) {
 }
 
 /// S's blocks as slices of sums: multiplied into, and 704 bytes of each cleared, added to and
-/// summed, which for many slices outweighs the products.
+/// summed, which for many slices outweighs the products. Set so that dubrovnik-356's order of
+/// solvers comes out as timed.
 constexpr double kSliceTileNs = 400;
 double forming_seconds(const WorkCounts& c) {
   const int slices = count_slices(linearize_flops(c.batches, c.pairs), c.tiles, c.images);
