@@ -203,17 +203,8 @@ double BundleSystem::step_cameras() {
     const auto& k = lenses_[lens];
     for (int j = 0; j < 3; ++j)
       if (c[6 + j] >= 0) trial_lenses_[lens][j] = k[j] + d[6 + j];
-    double* step = &cameras_[kCameraRecord * i + camera_record::kStep];
-    const double all[9] = {d[3],
-                           d[4],
-                           d[5],
-                           d[0],
-                           d[1],
-                           d[2],
-                           d[6],
-                           k[1] * d[6] + k[0] * d[7],
-                           k[2] * d[6] + k[0] * d[8]};
-    std::copy(all, all + 9, step);
+    camera_record::write_step(k.data(), d.data(),
+                              &cameras_[kCameraRecord * i + camera_record::kStep]);
     write_camera_record(i, trial_poses_[i], trial_lenses_[lens].data(), trial_cameras_.data());
     const auto norm = [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); };
     const auto& t = pose.translation;

@@ -10,14 +10,10 @@
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
 #include "linear/preconditioner.h"
+#include "linear/scaling.h"
 
 namespace sheaf {
 namespace {
-
-/// The power of two that brings x next to 1; 1 where there is none.
-double towards_one(double x) {
-  return x > 0 && std::isfinite(x) ? std::ldexp(1.0, -std::ilogb(x)) : 1;
-}
 
 /// S as block rows of T, double or float; each off-diagonal block stands in both of its rows, so
 /// that a row's sum has one owner. Rows and columns are scaled towards a unit diagonal of J^T J, by

@@ -5,37 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/scaling.h"
+
 namespace sheaf {
-namespace {
-
-/// The power of two that brings x next to 1; 1 where there is none.
-double towards_one(double x) {
-  return x > 0 && std::isfinite(x) ? std::ldexp(1.0, -std::ilogb(x)) : 1;
-}
-
-}  // namespace
-
 FloatImplicitOperator::FloatImplicitOperator(const Columns& columns, const HeldState& state,
                                              const Kernels& kernels, Threads& threads)
     : columns_(columns),
       state_(state),
       kernels_(kernels),
-      threads_(threads),
       images_(columns.num_images()),
-      slices_(state.chunks->slices.size() - 1),
       cameras_(kFloatCameraRecord * images_),
-      sums_(slices_ * kProductRecord * images_),
-      saved_(threads.count()) {
+      sums_(state, threads) {
   cameras_.fill(0);
-}
-
-template <class Task>
-void FloatImplicitOperator::for_each_image(const Task& task) {
-  constexpr std::size_t kImagesPerTask = 1024;
-  threads_.for_each((images_ + kImagesPerTask - 1) / kImagesPerTask, [&](std::size_t t) {
-    const std::size_t end = std::min(images_, (t + 1) * kImagesPerTask);
-    for (std::size_t i = t * kImagesPerTask; i < end; ++i) task(i);
-  });
 }
 
 /// The origin is the mean of the camera centres -R^T t, the unit of length the mean of |P.xyz| of
@@ -61,7 +42,7 @@ void FloatImplicitOperator::prepare(const double* squares) {
     length += std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
   }
   scale_ = towards_one(length / static_cast<double>(images_));
-  for_each_image([&](std::size_t i) {
+  sums_.for_each_image([&](std::size_t i) {
     const double* R = records + kCameraRecord * i;
     float* to = &cameras_[kFloatCameraRecord * i];
     double t[3];
@@ -86,7 +67,7 @@ double FloatImplicitOperator::scale_of_step(const double* x) const {
 
 void FloatImplicitOperator::apply(const double* x, double* y) {
   const double scale = scale_of_step(x);
-  for_each_image([&](std::size_t i) { write_step(x + kImageVector * i, scale, i); });
+  sums_.for_each_image([&](std::size_t i) { write_step(x + kImageVector * i, scale, i); });
   const FloatProductInput in{state_.batches,
                              cameras_.data(),
                              state_.points->data(),
@@ -94,55 +75,26 @@ void FloatImplicitOperator::apply(const double* x, double* y) {
                              {origin_[0], origin_[1], origin_[2]},
                              scale_,
                              state_.weights->data()};
-  const std::size_t stride = kProductRecord * images_;
-  threads_.for_each(slices_, [&](std::size_t s) {
-    Buffer<double>& saved = saved_[threads_.worker()];
-    if (saved.size() == 0) saved.allocate(product_scratch_doubles(*state_.batches));
-    double* sums = &sums_[s * stride];
-    std::fill_n(sums, stride, 0.0);
-    const auto& slices = state_.chunks->slices;
-    for (std::uint32_t c = slices[s]; c < slices[s + 1]; ++c)
-      kernels_.product_float(in, state_.chunks->chunks[c], reinterpret_cast<float*>(saved.data()),
-                             sums);
-  });
-  for_each_image([&](std::size_t i) { add_slices(i, 1 / scale, y + kImageVector * i); });
+  sums_.run(
+      [&](const Chunk& chunk, double* saved, double* sums) {
+        kernels_.product_float(in, chunk, reinterpret_cast<float*>(saved), sums);
+      },
+      [&](std::size_t i, double* total) {
+        for (int k = 0; k < 9; ++k) total[k] *= k < 3 ? 1 / scale * scale_ : 1 / scale;
+        read_product(state_.cameras->data() + kCameraRecord * i + camera_record::kFocal, total,
+                     y + kImageVector * i);
+      });
 }
 
 void FloatImplicitOperator::write_step(const double* x, double scale, std::size_t image) {
-  const double* record = state_.cameras->data() + kCameraRecord * image;
-  const double f = record[12], k1 = record[13], k2 = record[14];
-  const double step[9] = {x[3],
-                          x[4],
-                          x[5],
-                          scale_ * x[0],
-                          scale_ * x[1],
-                          scale_ * x[2],
-                          x[6],
-                          k1 * x[6] + f * x[7],
-                          k2 * x[6] + f * x[8]};
+  double step[9];
+  camera_record::write_step(state_.cameras->data() + kCameraRecord * image + camera_record::kFocal,
+                            x, step);
+  for (int k = 3; k < 6; ++k) step[k] = scale_ * step[k];
   float* to = &cameras_[kFloatCameraRecord * image + camera_record::kStep];
   for (int k = 0; k < 9; ++k) to[k] = static_cast<float>(scale * step[k]);
 }
 
-void FloatImplicitOperator::add_slices(std::size_t image, double scale, double* y) {
-  const std::size_t stride = kProductRecord * images_;
-  double total[9];
-  for (int k = 0; k < 9; ++k) {
-    total[k] = sums_[kProductRecord * image + k];
-    for (std::size_t s = 1; s < slices_; ++s)
-      total[k] += sums_[s * stride + kProductRecord * image + k];
-    total[k] *= k < 3 ? scale * scale_ : scale;
-  }
-  const double* record = state_.cameras->data() + kCameraRecord * image;
-  std::copy(total, total + 6, y);
-  y[6] = total[6] + record[13] * total[7] + record[14] * total[8];
-  y[7] = record[12] * total[7];
-  y[8] = record[12] * total[8];
-}
-
-std::uint64_t FloatImplicitOperator::bytes() const {
-  return cameras_.bytes() + sums_.bytes() +
-         saved_.size() * 8 * product_scratch_doubles(*state_.batches);
-}
+std::uint64_t FloatImplicitOperator::bytes() const { return cameras_.bytes() + sums_.bytes(); }
 
 }  // namespace sheaf

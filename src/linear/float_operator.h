@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "linear/camera_solver.h"
 #include "linear/conjugate_gradients.h"
+#include "linear/product_sums.h"
 
 namespace sheaf {
 
@@ -26,20 +26,15 @@ class FloatImplicitOperator : public ImageOperator {
  private:
   double scale_of_step(const double* x) const;
   void write_step(const double* x, double scale, std::size_t image);
-  void add_slices(std::size_t image, double scale, double* y);
-  template <class Task>
-  void for_each_image(const Task& task);
 
   const Columns& columns_;
   HeldState state_;
   const Kernels& kernels_;
-  Threads& threads_;
-  std::size_t images_, slices_;
+  std::size_t images_;
   double origin_[3] = {0, 0, 0}, scale_ = 1;
   const double* squares_ = nullptr;
   Buffer<float> cameras_;  ///< kFloatCameraRecord per image
-  Buffer<double> sums_;    ///< kProductRecord per image, one set per slice
-  std::vector<Buffer<double>> saved_;
+  ProductSums sums_;
 };
 
 }  // namespace sheaf
