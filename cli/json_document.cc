@@ -50,6 +50,20 @@ Json options_json(const SolveArguments& a) {
           {"simd", a.simd}};
 }
 
+Json range_json(const Range& range) {
+  return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
+}
+
+}  // namespace
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json iterations_json(const Summary& summary) {
+  Json iterations = Json::array();
+  for (const Iteration& it : summary.iterations) iterations.push_back(iteration_json(it));
+  return iterations;
+}
+
 Json loss_json(const Summary& s) {
   Json rounds = Json::array();
   for (const LossRound& round : s.rounds)
@@ -63,14 +77,6 @@ Json loss_json(const Summary& s) {
           {"sigma_px", s.final_sigma_px > 0 ? number(s.final_sigma_px) : Json()},
           {"rounds", rounds}};
 }
-
-Json range_json(const Range& range) {
-  return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
-}
-
-}  // namespace
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json counts_json(const Problem& problem) {
   return {{"cameras", problem.cameras.size()},
@@ -123,8 +129,6 @@ Json scene_options_json(const SceneOptions& o) {
 }
 
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
-  Json iterations = Json::array();
-  for (const Iteration& it : s.iterations) iterations.push_back(iteration_json(it));
   return {{"version", SHEAF_VERSION},
           {"input", record.input},
           {"options", options_json(record.arguments)},
@@ -138,7 +142,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
           {"loss", loss_json(s)},
           {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
           {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
-          {"iterations", iterations},
+          {"iterations", iterations_json(s)},
           {"time",
            {{"read_s", record.read_s},
             {"setup_s", s.setup_s},

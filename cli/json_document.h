@@ -28,6 +28,8 @@ Json counts_json(const Problem& problem);
 Json observations_json(const std::vector<std::uint64_t>& ids, const Problem& problem);
 Json statistics_json(const Statistics& statistics);
 Json scene_options_json(const SceneOptions& options);
+Json iterations_json(const Summary& summary);
+Json loss_json(const Summary& summary);
 
 /// What the JSON of a solve is made of.
 struct SolveRecord {

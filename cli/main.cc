@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   sheaf::add_perturb(app, exit_code);
   sheaf::add_evaluate(app, exit_code);
   sheaf::add_compare(app, exit_code);
+  sheaf::add_photometric(app, exit_code);
   sheaf::add_generate(app, exit_code);
   sheaf::add_demo(app, exit_code);
   try {

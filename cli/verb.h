@@ -22,6 +22,7 @@ void add_convert(CLI::App& app, int& exit_code);
 void add_perturb(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_compare(CLI::App& app, int& exit_code);
+void add_photometric(CLI::App& app, int& exit_code);
 void add_generate(CLI::App& app, int& exit_code);
 void add_demo(CLI::App& app, int& exit_code);
 

@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "sheaf/error.h"
+#include "sheaf/photometric.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -44,5 +46,25 @@ Result<void> check_writable(const std::filesystem::path& path);
 /// each with its camera frusta as points and edges.
 Result<void> write_ply(const Problem& before, const Problem& after,
                        const std::filesystem::path& path);
+
+/// A photometric problem and what its folder has beside it.
+struct PhotometricFolder {
+  PhotometricProblem problem;
+  std::string format;                        ///< "direct"
+  std::vector<double> times;                 ///< one for each image, as the folder states them
+  std::vector<std::filesystem::path> files;  ///< of the images
+  double read_s = 0;                         ///< seconds spent reading and decoding
+};
+
+/// Reads a folder of images with poses and points: poses.txt (time, cam_from_world translation,
+/// quaternion x y z w), points.txt (X Y Z and 16 grey levels), 0.png, 1.png, ... Errors:
+/// ErrorCode::unreadable_input.
+Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
+                                           const Pinhole& camera);
+
+/// Writes the refined state in the same format into a folder, which is made where it is not there:
+/// poses.txt, points.txt, the images as they were, and brightness.txt (a b of each image). Errors:
+/// ErrorCode::unwritable_output.
+Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path);
 
 }  // namespace sheaf

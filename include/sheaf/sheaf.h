@@ -6,6 +6,7 @@
 #include "sheaf/io.h"
 #include "sheaf/loss.h"
 #include "sheaf/options.h"
+#include "sheaf/photometric.h"
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"

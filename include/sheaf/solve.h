@@ -4,6 +4,7 @@
 
 #include "sheaf/error.h"
 #include "sheaf/options.h"
+#include "sheaf/photometric.h"
 #include "sheaf/problem.h"
 #include "sheaf/summary.h"
 
@@ -14,5 +15,10 @@ namespace sheaf {
 /// contradict it; `try_solve` returns it instead.
 Summary solve(Problem& problem, const SolveOptions& options = {});
 Result<Summary> try_solve(Problem& problem, const SolveOptions& options = {});
+
+/// Refines poses, points and brightness from the pixels, in place. Errors: ErrorCode::usage for a
+/// problem that `validate` refuses or options that contradict it.
+Result<PhotometricSummary> refine_photometric(PhotometricProblem& problem,
+                                              const PhotometricOptions& options = {});
 
 }  // namespace sheaf

@@ -82,4 +82,17 @@ struct Summary {
   bool usable() const { return termination != Termination::no_usable_step; }
 };
 
+/// What a photometric refinement did. Costs are 1/2 sum rho in grey levels squared, and where
+/// Summary says px its numbers are grey levels here.
+struct PhotometricSummary {
+  Summary solve;
+  std::uint64_t patches_total = 0;    ///< a point in an image that is not its host
+  std::uint64_t patches_visible = 0;  ///< of them, those that counted at the start
+  std::uint64_t patches_left = 0;     ///< of those, the ones that are outside at the end
+  /// Of the residuals of the patches visible at the start, read bilinearly, brightness as it was
+  /// and as it became. A patch that left counts as much as it did, and no less than the mean did.
+  double initial_rms_grey = 0, final_rms_grey = 0;
+  double initial_median_grey = 0, final_median_grey = 0;  ///< of |r|
+};
+
 }  // namespace sheaf

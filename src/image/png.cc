@@ -4,6 +4,9 @@
 
 #include <png.h>
 
+#include <cstdint>
+#include <vector>
+
 namespace sheaf {
 
 Result<std::string> encode_png(const Image& image) {

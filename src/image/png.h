@@ -3,7 +3,9 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
+#include "image/grey.h"
 #include "image/image.h"
 #include "sheaf/error.h"
 
@@ -12,5 +14,9 @@ namespace sheaf {
 /// The bytes of a PNG file, 8 bits a channel. Errors: ErrorCode::unwritable_output, as for an image
 /// without pixels.
 Result<std::string> encode_png(const Image& image);
+
+/// The samples of a PNG file, grey or colour, of 8 or 16 bits; palettes become colours, fewer bits
+/// become 8, transparency is left out. Errors: ErrorCode::unreadable_input with `name` in front.
+Result<Raster> decode_png(std::string_view bytes, const std::string& name);
 
 }  // namespace sheaf

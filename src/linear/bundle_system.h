@@ -41,7 +41,8 @@ class BundleSystem : public System {
   Trial trial() override;
   void accept() override;
   double residual_scale(double quantile) override;
-  void store(Problem& problem) const override;
+  /// Writes the held state into the problem; what is fixed is not touched.
+  void store(Problem& problem) const;
 
   /// Observations behind their camera at the held state.
   std::uint64_t count_behind();

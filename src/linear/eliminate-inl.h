@@ -68,24 +68,6 @@ struct PointSums {
   }
 };
 
-HWY_INLINE void save(const LaneJacobian& j, double* to) {
-  store(j.r[0], to), store(j.r[1], to + kLanes);
-  for (int r = 0; r < 2; ++r) {
-    for (int i = 0; i < 9; ++i) store(j.camera[r][i], to + (2 + 9 * r + i) * kLanes);
-    for (int i = 0; i < 3; ++i) store(j.point[r][i], to + (20 + 3 * r + i) * kLanes);
-  }
-}
-
-HWY_INLINE LaneJacobian restore(const double* from) {
-  LaneJacobian j;
-  j.r[0] = load(from), j.r[1] = load(from + kLanes);
-  for (int r = 0; r < 2; ++r) {
-    for (int i = 0; i < 9; ++i) j.camera[r][i] = load(from + (2 + 9 * r + i) * kLanes);
-    for (int i = 0; i < 3; ++i) j.point[r][i] = load(from + (20 + 3 * r + i) * kLanes);
-  }
-  return j;
-}
-
 /// Writes the T and C records of one observation per lane.
 HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w, double* T,
                               double* C) {
@@ -134,6 +116,43 @@ struct EliminateSums {
   V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
 
+/// One part of one group, whose rows are known.
+struct GroupPart {
+  double damping;
+  bool points_held;
+  std::uint32_t track;
+  std::size_t group;
+  int part;
+};
+
+/// Factors the points of a part and writes their records; the rows of observation o stand at
+/// rows + stride o.
+HWY_INLINE void finish_group(const PointSums& p, const GroupPart& of, const double* rows,
+                             std::size_t stride, double* T, double* C, const EliminateOutput& to,
+                             EliminateSums& sums) {
+  const int lane = of.part * kLanes;
+  const V lambda = set(of.damping);
+  V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
+  Factor f =
+      factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12, hn::Add(p.v22, D2));
+  if (of.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
+    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
+    D0 = D1 = D2 = zero();
+  }
+  V w[3];
+  forward(f, p.g, w);
+  const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
+  sums.decrease[of.part] = hn::Add(sums.decrease[of.part], w2);
+  sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], w2);
+  double* out = to.factors + kFactorGroup * of.group + lane;
+  const V all[12] = {f.i00, f.l10, f.l20, f.i11, f.l21, f.i22, w[0], w[1], w[2], D0, D1, D2};
+  for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
+
+  for (std::uint32_t o = 0; o < of.track; ++o)
+    write_records(restore(rows + stride * o), f, w, T + kTRecord * (8 * o + lane),
+                  C + kCRecord * (8 * o + lane));
+}
+
 /// The rows of a loss: sqrt(rho') times those of the residual.
 HWY_INLINE Rho apply_loss(const ScaledLoss& loss, LaneJacobian& j) {
   const Rho rho = rho_lanes(LossLanes(loss), fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
@@ -177,26 +196,8 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   sums.square[part] = square;
   sums.loss[part] = robust;
 
-  const V lambda = set(in.damping);
-  V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
-  Factor f =
-      factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12, hn::Add(p.v22, D2));
-  if (in.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
-    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
-    D0 = D1 = D2 = zero();
-  }
-  V w[3];
-  forward(f, p.g, w);
-  const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
-  sums.decrease[part] = hn::Add(sums.decrease[part], w2);
-  sums.gradient2[part] = hn::Max(sums.gradient2[part], w2);
-  double* out = to.factors + kFactorGroup * g + lane;
-  const V all[12] = {f.i00, f.l10, f.l20, f.i11, f.l21, f.i22, w[0], w[1], w[2], D0, D1, D2};
-  for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
-
-  for (std::uint32_t o = 0; o < group.track; ++o)
-    write_records(restore(jacobians + kJacobianFields * kLanes * o), f, w,
-                  T + kTRecord * (8 * o + lane), C + kCRecord * (8 * o + lane));
+  finish_group(p, {in.damping, in.points_held, group.track, g, part}, jacobians,
+               kJacobianFields * kLanes, T, C, to, sums);
 }
 
 HWY_INLINE double sum_parts(const V* parts) {

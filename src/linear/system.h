@@ -6,7 +6,6 @@
 #include <functional>
 
 #include "geometry/loss.h"
-#include "sheaf/problem.h"
 
 namespace sheaf {
 
@@ -35,6 +34,7 @@ struct Trial {
   double predicted_decrease = 0;  ///< of the cost, by the linear model
   double step_norm = 0;           ///< largest relative change of any one block
   std::uint64_t newly_behind = 0;  ///< observations that went behind their camera (if watched)
+  double motion_px = 0;            ///< median move in the images, where there are images
 };
 
 /// The one seam between the trust region and everything below it. Only scalars cross: state and
@@ -58,9 +58,6 @@ class System {
   /// The given quantile of |r_x| and |r_y| together over all observations at the held state, px:
   /// the smallest of these values that no less than this fraction of them reaches down to.
   virtual double residual_scale(double quantile) = 0;
-
-  /// Writes the held state into the problem; what is fixed is not touched.
-  virtual void store(Problem& problem) const = 0;
 };
 
 }  // namespace sheaf

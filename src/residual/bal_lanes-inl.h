@@ -9,24 +9,11 @@
 #define SHEAF_RESIDUAL_BAL_LANES_INL_H_
 #endif
 
-#include "platform/simd-inl.h"
+#include "residual/rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
-
-/// The first 8 Octets fields of the 24-double camera records of kLanes images; `image` points at
-/// the part's first lane, `uniform` is the image of all lanes or negative.
-template <int Octets>
-HWY_INLINE void load_cameras(const double* cameras, const std::uint32_t* image,
-                             std::int32_t uniform, V* c) {
-  if (uniform >= 0) {
-    const double* record = cameras + 24 * static_cast<std::size_t>(uniform);
-    for (int o = 0; o < Octets; ++o) broadcast_record(record + 8 * o, c + 8 * o);
-  } else {
-    for (int o = 0; o < Octets; ++o) load_records(cameras + 8 * o, 24, image, c + 8 * o);
-  }
-}
 
 /// A point in the camera's frame and its normalised image p = -P.xy / P.z; W: lanes of double or
 /// of float.
@@ -63,12 +50,6 @@ HWY_INLINE W distortion_slope(const C& c, W n) {
   const W k2 = hn::Mul(fill<W>(4.0), c[14]);
   return hn::Mul(c[12], fma(k2, n, k1));
 }
-
-/// Residual (2), camera Jacobian (2 x 9) and point Jacobian (2 x 3) of one observation per lane.
-struct LaneJacobian {
-  V r[2], camera[2][9], point[2][3];
-};
-constexpr int kJacobianFields = 26;
 
 /// scale multiplies residual and Jacobian (0 for masked lanes); nullptr: all ones.
 HWY_INLINE LaneJacobian linearize_lanes(const V* c, V X0, V X1, V X2, V zx, V zy, const V* scale) {
@@ -110,15 +91,6 @@ HWY_INLINE LaneJacobian linearize_lanes(const V* c, V X0, V X1, V X2, V zx, V zy
     j.point[1][i] = fma(b, c[i], fma(e, c[3 + i], hn::Mul(e2, c[6 + i])));
   }
   return j;
-}
-
-/// 1 in lanes below `lanes`, 0 beyond, for the part that starts at lane `first`.
-HWY_INLINE V lane_mask(std::uint32_t lanes, int first) {
-  if (lanes == 8) return set(1.0);
-  alignas(64) double ones[8];
-  for (int l = 0; l < kLanes; ++l)
-    ones[l] = static_cast<std::uint32_t>(first + l) < lanes ? 1.0 : 0.0;
-  return load(ones);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -54,8 +54,13 @@ struct Damping {
 class Loop {
  public:
   Loop(System& system, const ScaledLoss& loss, const SolveOptions& options, const Stopwatch& clock,
-       Summary& summary)
-      : system_(system), loss_(loss), options_(options), since_start_(clock), summary_(summary) {
+       Summary& summary, double settled_motion_px)
+      : system_(system),
+        loss_(loss),
+        options_(options),
+        since_start_(clock),
+        summary_(summary),
+        settled_motion_px_(settled_motion_px) {
     damping_.lambda = options.initial_damping > 0 ? options.initial_damping : default_damping(1);
   }
 
@@ -135,7 +140,8 @@ class Loop {
     damping_.shrink(it.gain_ratio);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
-    small_decreases_ = decrease < options_.tolerance ? small_decreases_ + 1 : 0;
+    const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
+    small_decreases_ = small ? small_decreases_ + 1 : 0;
     publish(it);
     if (small_decreases_ >= (std::isinf(options_.tolerance) ? 1 : 2))
       end(Termination::cost_converged,
@@ -213,6 +219,7 @@ class Loop {
   const Stopwatch& since_start_;
   const Stopwatch since_begin_;
   Summary& summary_;
+  const double settled_motion_px_;
   Damping damping_;
   /// An iterative solver solves loosely at first and tighter as the cost settles.
   double forcing_ = kLoosestForcing;
@@ -233,8 +240,8 @@ double default_damping(std::size_t images) {
 }
 
 void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
-              const Stopwatch& since_start, Summary& summary) {
-  Loop(system, loss, options, since_start, summary).run();
+              const Stopwatch& since_start, Summary& summary, double settled_motion_px) {
+  Loop(system, loss, options, since_start, summary, settled_motion_px).run();
 }
 
 }  // namespace sheaf

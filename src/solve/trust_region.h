@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 
 #include "linear/system.h"
 #include "platform/clock.h"
@@ -20,9 +21,11 @@ double default_damping(std::size_t images);
 
 /// Levenberg-Marquardt with gain-ratio control on any System, with one loss. Adds to the summary's
 /// iterations, and sets costs, termination and words; the best state is the system's held one.
-/// An infinite tolerance ends it after one accepted step.
+/// An infinite tolerance ends it after one accepted step; steps whose median motion is above
+/// settled_motion_px never end it.
 /// `since_start` runs since set-up began (the time limit counts from there).
 void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
-              const Stopwatch& since_start, Summary& summary);
+              const Stopwatch& since_start, Summary& summary,
+              double settled_motion_px = std::numeric_limits<double>::infinity());
 
 }  // namespace sheaf

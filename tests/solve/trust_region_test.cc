@@ -69,8 +69,6 @@ class Valley : public System {
 
   double residual_scale(double) override { return 0; }
 
-  void store(Problem&) const override {}
-
   double cost(const State& s) const {
     const double r0 = 10 * (s[1] - s[0] * s[0]), r1 = 1 - s[0];
     return (r0 * r0 + r1 * r1 + left_ * left_) / 2;

@@ -1,0 +1,140 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "photometric_arguments.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "solve_arguments.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+const std::map<std::string, Interpolation> kInterpolations = {
+    {"bicubic", Interpolation::bicubic},
+    {"bilinear", Interpolation::bilinear},
+    {"bilinear-exact", Interpolation::bilinear_exact}};
+
+std::string parse_intrinsics(const std::string& text, Pinhole& out) {
+  std::array<double, 4> v{};
+  const char *p = text.data(), *end = p + text.size();
+  for (std::size_t k = 0; k < v.size(); ++k) {
+    const auto [stop, error] = std::from_chars(p, end, v[k]);
+    const bool last = k + 1 == v.size();
+    if (error != std::errc() || !std::isfinite(v[k]) || (k < 2 && v[k] == 0) ||
+        (last ? stop != end : stop == end || *stop != ','))
+      return "expected fx,fy,cx,cy in pixels, focal lengths not 0, not '" + text + "'";
+    p = last ? stop : stop + 1;
+  }
+  out = {v[0], v[1], v[2], v[3]};
+  return "";
+}
+
+void add_model_options(CLI::App& verb, PhotometricArguments& a) {
+  verb.add_option("--intrinsics", a.intrinsics,
+                  "fx,fy,cx,cy of all images, pixels; the first pixel's centre is (0, 0)")
+      ->type_name("FX,FY,CX,CY")
+      ->required()
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Pinhole ignored;
+            return parse_intrinsics(text, ignored);
+          },
+          ""));
+  verb.add_option("--interpolation", a.interpolation,
+                  "bicubic (Catmull-Rom, exact slopes), bilinear (slopes are central differences) "
+                  "or bilinear-exact")
+      ->type_name("NAME")
+      ->check(one_of({"bicubic", "bilinear", "bilinear-exact"}))
+      ->capture_default_str();
+  verb.add_option("--brightness", a.brightness,
+                  "affine (every image shows a L + b of the grey level L) or none")
+      ->type_name("NAME")
+      ->check(one_of({"affine", "none"}))
+      ->capture_default_str();
+  verb.add_option("--loss", a.loss,
+                  "none, huber, soft-l1, cauchy, tukey or geman-mcclure, as NAME:SCALE in grey "
+                  "levels or NAME:auto (from the median residual)")
+      ->type_name("NAME[:SCALE|:auto]")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Loss loss;
+            if (std::string wrong = parse_loss(text, loss); !wrong.empty()) return wrong;
+            return std::string(loss.graduated ? "expected a loss without :gnc" : "");
+          },
+          ""))
+      ->capture_default_str();
+  verb.add_option("--loss-on", a.loss_on,
+                  "pixel (each residual by itself) or patch (a patch's residuals as one vector)")
+      ->type_name("NAME")
+      ->check(one_of({"pixel", "patch"}))
+      ->capture_default_str();
+  verb.add_option("--leaving", a.leaving,
+                  "a patch that leaves its image costs as much as before (truncated), or nothing, "
+                  "and any patch may come in (free: what many implementations do)")
+      ->type_name("RULE")
+      ->check(one_of({"truncated", "free"}))
+      ->capture_default_str();
+  verb.add_option("--fix", a.fix, "hold poses or points")
+      ->type_name("NAME")
+      ->check(one_of({"poses", "points"}));
+}
+
+}  // namespace
+
+void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const double most = std::numeric_limits<double>::max();
+  add_model_options(verb, a);
+  verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
+      ->type_name("N")
+      ->check(whole_number_from(0, "a whole number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--tolerance", a.tolerance,
+                  "stop when the relative decrease of the cost stays below this twice")
+      ->type_name("T")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--motion", a.motion_px, "and the median patch moves by less than this, pixels")
+      ->type_name("PX")
+      ->check(number_in(0, inf, true, "a number of pixels from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--time-limit", a.time_limit_s,
+                  "stop after this many seconds of set-up and solving, write the best state and "
+                  "exit with 130")
+      ->type_name("SECONDS")
+      ->check(number_in(0, inf, false, "a number of seconds above 0"));
+  verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
+      ->type_name("LAMBDA")
+      ->check(number_in(0, most, true, "a number from 0 up"))
+      ->capture_default_str();
+}
+
+PhotometricOptions photometric_options(const PhotometricArguments& a) {
+  PhotometricOptions options;
+  options.max_iterations = a.max_iterations;
+  options.tolerance = a.tolerance;
+  options.motion_px = a.motion_px;
+  if (a.time_limit_s > 0) options.time_limit_s = a.time_limit_s;
+  options.interpolation = kInterpolations.at(a.interpolation);
+  options.affine_brightness = a.brightness == "affine";
+  parse_loss(a.loss, options.loss);
+  options.loss_per_patch = a.loss_on == "patch";
+  options.leaving = a.leaving == "free" ? Leaving::free : Leaving::truncated;
+  options.fix_poses = a.fix == "poses";
+  options.fix_points = a.fix == "points";
+  options.initial_damping = a.initial_damping;
+  return options;
+}
+
+Pinhole camera_of(const PhotometricArguments& a) {
+  Pinhole camera;
+  parse_intrinsics(a.intrinsics, camera);
+  return camera;
+}
+
+}  // namespace sheaf

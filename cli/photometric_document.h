@@ -1,0 +1,23 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "json_document.h"
+#include "photometric_arguments.h"
+#include "sheaf/photometric.h"
+#include "sheaf/summary.h"
+
+namespace sheaf {
+
+/// What the JSON of a photometric refinement is made of.
+struct PhotometricRecord {
+  std::string in;
+  PhotometricArguments arguments;
+  double read_s = 0, write_s = 0, total_s = 0;
+};
+Json photometric_json(const PhotometricRecord& record, const PhotometricSummary& summary,
+                      const PhotometricProblem& problem);
+
+}  // namespace sheaf

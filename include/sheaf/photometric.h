@@ -1,0 +1,125 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "sheaf/error.h"
+#include "sheaf/loss.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+struct Iteration;
+
+/// Grey levels row by row from the top left; pixel (0, 0) has its centre at (0, 0).
+struct GreyImage {
+  int width = 0, height = 0;
+  std::vector<float> pixels;  ///< width x height, 0 to 255 for 8-bit images
+};
+
+/// u = fx X / Z + cx, v = fy Y / Z + cy, for a point (X, Y, Z) in the camera's frame; looks along
+/// +z, v downwards.
+struct Pinhole {
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< pixels
+};
+
+/// What an image makes of a common grey level L: a L + b.
+struct Brightness {
+  double a = 1;
+  double b = 0;  ///< grey levels
+};
+
+/// Where a patch has its pixels, around its middle.
+struct Pattern {
+  std::string name;  ///< "4x4", ...
+  std::vector<std::int8_t> dx, dy;
+  std::size_t size() const { return dx.size(); }
+};
+
+/// "4x4" (-2 to 1 both ways, as the course has it), "3x3", "5x5", "7x7", "9x9", "6x6", "8x8", "8"
+/// (the eight of DSO), "cross" (five). Pixels are listed column by column. Errors:
+/// ErrorCode::usage, naming those that are known.
+Result<Pattern> make_pattern(const std::string& name);
+std::vector<std::string> pattern_names();
+
+/// Images, their poses, and points whose grey patches are known: stored with the points, or seen in
+/// a host image.
+struct PhotometricProblem {
+  Pinhole camera;                 ///< of all images
+  std::vector<GreyImage> images;  ///< one for each pose
+  std::vector<Pose> poses;        ///< cam_from_world, +z forward
+  std::vector<double> points;     ///< 3 x points: X, Y, Z, scene units
+  /// Either these: grey levels of the `patch` pixels of each point ...
+  Pattern patch;
+  std::vector<float> patches;  ///< patch.size() x points, or empty
+  /// ... or these: the image that a point's patch is taken from, and where. The point lies on that
+  /// pixel's ray.
+  std::vector<std::uint32_t> host;     ///< one for each point, or empty
+  std::vector<double> host_xy;         ///< 2 x points, pixels
+  std::vector<Brightness> brightness;  ///< one for each image, or empty: all (1, 0)
+
+  std::size_t num_points() const { return points.size() / 3; }
+  bool has_hosts() const { return !host.empty(); }
+};
+
+/// Checks sizes, index ranges, finite numbers and unit quaternions. The message names the first
+/// offending entry.
+Result<void> validate(const PhotometricProblem& problem);
+
+/// How an image is read between its pixels.
+enum class Interpolation {
+  bicubic,         ///< Catmull-Rom, exact derivative
+  bilinear,        ///< with the bilinear interpolation of central differences as slope
+  bilinear_exact,  ///< with its own slope
+};
+
+enum class Warp {
+  automatic,      ///< inverse_depth where points have a host, else translation
+  translation,    ///< all pixels of a patch move with its middle
+  inverse_depth,  ///< each pixel is projected by itself, at the depth of the patch's middle
+};
+
+enum class Parametrisation {
+  automatic,      ///< inverse_depth where points have a host, else xyz
+  xyz,            ///< three numbers a point, in the world
+  inverse_depth,  ///< one number a point, along its host's ray
+};
+
+/// A patch that leaves its image, or goes behind it.
+enum class Leaving {
+  truncated,  ///< costs as much as it did at the start of the round, and no less than the mean
+  free,       ///< costs nothing, and any patch may come in at any time (compatibility)
+};
+
+struct PhotometricOptions {
+  int max_iterations = 50;  ///< trust region steps tried, rejected ones included, over all levels
+  double tolerance = 1e-6;  ///< stop when the relative cost decrease stays below this twice ...
+  double motion_px = 0.01;  ///< ... and the median patch moves less than this
+  Interpolation interpolation = Interpolation::bicubic;
+  Warp warp = Warp::automatic;
+  Parametrisation parametrisation = Parametrisation::automatic;
+  std::string pattern = "4x4";  ///< where patches are taken from hosts
+  bool affine_brightness = true;
+  double prior_a = 1;    ///< weak priors a = 1, b = 0: standard deviations, weighed against pixels
+  double prior_b = 100;  ///< of one grey level's
+  Loss loss = Huber{};   ///< scale in grey levels; automatic: from the median residual
+  bool loss_per_patch = false;  ///< of a patch's residuals as one vector, not of each pixel's
+  double min_zncc =
+      0;  ///< patches that correlate less at the start of a round are left out; -1: all
+  Leaving leaving = Leaving::truncated;
+  int levels = 1;  ///< of the pyramid
+  bool fix_poses = false, fix_points = false;
+  double initial_damping = 0;  ///< 0: the default rule
+  int threads = 0;             ///< 0: all; the result does not depend on it
+  double time_limit_s = std::numeric_limits<double>::infinity();
+  std::function<bool(const Iteration&)> on_iteration{};  ///< return false to stop
+  std::stop_token stop{};
+};
+
+}  // namespace sheaf

@@ -1,0 +1,373 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "linear/photometric_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linear/plan.h"
+#include "linear/slices.h"
+
+namespace sheaf {
+
+namespace {
+
+/// Elimination sees sights as observations without a measurement.
+Batches arrange_sights(const std::vector<Sight>& sights, std::size_t blocks, std::size_t points) {
+  Problem shell;
+  shell.poses.resize(blocks);
+  shell.points.resize(3 * points);
+  shell.observation_xy.resize(2 * sights.size());
+  for (const Sight& sight : sights) {
+    shell.observation_image.push_back(sight.image);
+    shell.observation_point.push_back(sight.point);
+  }
+  return arrange(shell);
+}
+
+Columns number_columns(std::size_t images, const PhotometricRules& rules) {
+  Columns out;
+  out.of_image.assign(9 * images, Columns::kFixed);
+  for (std::size_t i = 0; i < images; ++i)
+    for (int k = 0; k < 8; ++k)
+      if (k < 6 ? !rules.poses_held : rules.brightness) out.of_image[9 * i + k] = out.count++;
+  return out;
+}
+
+double norm3(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+}  // namespace
+
+PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& state,
+                                     const std::vector<Sight>& sights,
+                                     const PhotometricRules& rules, const Kernels& kernels,
+                                     Threads& threads)
+    : scene_(scene),
+      rules_(rules),
+      kernels_(kernels),
+      row_kernels_(row_kernels(kernels.name)),
+      patch_kernels_(photometric_kernels(kernels.name)),
+      threads_(threads),
+      batches_(arrange_sights(sights, scene.num_images(), state.points.size() / 3)),
+      columns_(number_columns(scene.num_images(), rules)),
+      initial_points_(state.points),
+      stage_(columns_) {
+  for (std::uint32_t i = 0; i < scene.num_images(); ++i) block_image_.push_back(i);
+  const bool couples = !rules.points_held;
+  chunks_ = cut_into_chunks(batches_, static_cast<std::uint32_t>(block_image_.size()),
+                            couples ? ChunkLists::pairs : ChunkLists::diagonal);
+  fill_state(state);
+  const std::size_t slices = chunks_.slices.size() - 1;
+  factors_.allocate(kFactorGroup * batches_.groups.size());
+  tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
+  diagonal_.allocate(slices * kDiagonalDoubles * block_image_.size());
+  steps_.allocate(kStepRecord * block_image_.size());
+  leaving_.allocate(16 * batches_.num_batches());
+  scratch_.resize(static_cast<std::size_t>(threads.count()));
+  Plan plan = plan_solver(count_work(batches_, columns_, rules.points_held));
+  if (plan.kind == SolverKind::implicit_cg) plan.kind = SolverKind::explicit_cg;
+  solver_name_ = to_string(plan.kind);
+  if (plan.kind == SolverKind::blocks)
+    stage_.set_solver(make_block_solver(columns_, threads));
+  else if (plan.kind == SolverKind::dense)
+    stage_.set_solver(make_dense_solver(columns_, kernels, threads));
+  else if (plan.kind == SolverKind::sparse)
+    stage_.set_solver(make_sparse_solver(columns_, chunks_, kernels, threads));
+  else
+    stage_.set_solver(make_explicit_solver(columns_, chunks_, false, kernels, threads));
+}
+
+void PhotometricSystem::allocate(Half& half) const {
+  half.views.allocate(kViewRecord * block_image_.size());
+  half.points.allocate(kPointGroup * batches_.groups.size());
+  half.rows.allocate(kRowBatch * batches_.num_batches());
+  half.brightness_sums.allocate(rules_.brightness ? kBrightnessBatch * batches_.num_batches() : 0);
+  half.seen.allocate(16 * batches_.num_batches());
+  half.costs.allocate(16 * batches_.num_batches());
+}
+
+void PhotometricSystem::fill_state(const PatchState& state) {
+  for (const Pose& pose : state.poses) held_.poses.push_back({pose.rotation, pose.translation});
+  held_.brightness = state.brightness;
+  tried_.poses = held_.poses;
+  tried_.brightness = held_.brightness;
+  allocate(held_);
+  allocate(tried_);
+  if (scene_.has_rays()) rays_.allocate(held_.points.size());
+  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
+    for (int l = 0; l < 8; ++l) {
+      const std::size_t point = 3 * std::size_t(batches_.lane_point[8 * g + l]);
+      for (int d = 0; d < 3; ++d) {
+        held_.points[kPointGroup * g + 8 * d + l] = state.points[point + d];
+        if (scene_.has_rays()) rays_[kPointGroup * g + 8 * d + l] = scene_.rays[point + d];
+      }
+    }
+  write_views(held_);
+}
+
+void PhotometricSystem::write_views(Half& half) const {
+  for (std::size_t i = 0; i < block_image_.size(); ++i) {
+    double* view = &half.views[kViewRecord * i];
+    const Matrix3<double> R = matrix_from_quaternion(half.poses[i].rotation);
+    std::copy(R.begin(), R.end(), view);
+    std::copy(half.poses[i].translation.begin(), half.poses[i].translation.end(), view + 9);
+    view[12] = half.brightness[i].a;
+    view[13] = half.brightness[i].b;
+    std::fill(view + 14, view + kViewRecord, 0.0);
+  }
+}
+
+/// Chunks write what is theirs; their costs are added in order.
+PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
+  const PhotometricInput in{&batches_,
+                            scene_.planes.data(),
+                            block_image_.data(),
+                            half.views.data(),
+                            half.points.data(),
+                            scene_.has_rays() ? rays_.data() : nullptr,
+                            scene_.references.data(),
+                            &scene_.grid,
+                            leaving_.data(),
+                            scene_.camera,
+                            scene_.taps,
+                            loss_,
+                            rules_.loss_per_patch,
+                            rules_.brightness};
+  std::vector<PhotometricOutput> outputs(
+      chunks_.chunks.size(), {half.rows.data(), half.brightness_sums.data(), half.seen.data(),
+                              half.costs.data(), 0, 0, 0});
+  threads_.for_each(outputs.size(), [&](std::size_t c) {
+    patch_kernels_.collapse(in, chunks_.chunks[c].first_group, chunks_.chunks[c].end_group,
+                            outputs[c]);
+  });
+  Totals totals;
+  for (const PhotometricOutput& out : outputs) {
+    totals.cost += out.cost;
+    totals.square_sum += out.square_sum;
+    totals.left += out.left;
+  }
+  totals.cost += prior_cost(half);
+  return totals;
+}
+
+/// Collapses the held state under this loss, unless that is what its rows are.
+void PhotometricSystem::hold(const ScaledLoss& loss) {
+  if (collapsed_ && loss.kind == loss_.kind && loss.scale_px == loss_.scale_px) return;
+  loss_ = loss;
+  leaving_.fill(0);
+  totals_ = collapse(held_);
+  collapsed_ = true;
+  if (rules_.leaving_is_free) return;
+  set_leaving();
+  if (totals_.left > 0) totals_ = collapse(held_);
+}
+
+/// A patch that leaves costs as much as it does now, and no less than the mean does.
+void PhotometricSystem::set_leaving() {
+  double sum[2] = {0, 0};
+  std::uint64_t count = 0;
+  const auto for_each_patch = [&](const auto& visit) {
+    for (const Batches::Group& group : batches_.groups)
+      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+        for (std::uint32_t l = 0; l < group.lanes; ++l) visit(16 * b + l);
+  };
+  for_each_patch([&](std::uint64_t at) {
+    if (std::isnan(held_.seen[at])) return;
+    sum[0] += held_.costs[at], sum[1] += held_.costs[at + 8];
+    ++count;
+  });
+  if (count == 0) return;
+  for_each_patch([&](std::uint64_t at) {
+    for (int k = 0; k < 2; ++k)
+      leaving_[at + 8 * k] = std::max(held_.costs[at + 8 * k], sum[k] / static_cast<double>(count));
+  });
+}
+
+/// What a patch says of its image's brightness alone.
+void PhotometricSystem::add_brightness(const Chunk& chunk, double* diagonal) const {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group& group = batches_.groups[g];
+    for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+      for (std::uint32_t l = 0; l < group.lanes; ++l) {
+        const double* from = &held_.brightness_sums[kBrightnessBatch * b + l];
+        double* block = diagonal + kDiagonalDoubles * batches_.image[8 * b + l];
+        block[8 * 6 + 6] += from[0];
+        block[8 * 6 + 7] += from[8];
+        block[8 * 7 + 6] += from[8];
+        block[8 * 7 + 7] += from[16];
+        block[72 + 6] += from[24];
+        block[72 + 7] += from[32];
+      }
+  }
+}
+
+void PhotometricSystem::add_priors() {
+  const double wa = 1 / (rules_.prior_a * rules_.prior_a);
+  const double wb = 1 / (rules_.prior_b * rules_.prior_b);
+  for (std::size_t i = 0; i < held_.brightness.size(); ++i) {
+    double* block = &diagonal_[kDiagonalDoubles * i];
+    block[8 * 6 + 6] += wa;
+    block[8 * 7 + 7] += wb;
+    block[72 + 6] += wa * (held_.brightness[i].a - 1);
+    block[72 + 7] += wb * held_.brightness[i].b;
+  }
+}
+
+/// Twice the priors' part of the cost.
+double PhotometricSystem::prior_cost(const Half& half) const {
+  double sum = 0;
+  if (!rules_.brightness) return sum;
+  for (const Brightness& of : half.brightness) {
+    const double ra = (of.a - 1) / rules_.prior_a, rb = of.b / rules_.prior_b;
+    sum += ra * ra + rb * rb;
+  }
+  return sum;
+}
+
+Step PhotometricSystem::propose(const StepRequest& request) {
+  hold(request.loss);
+  const std::size_t slices = chunks_.slices.size() - 1;
+  const std::size_t tile_doubles = tiles_.size() / slices;
+  const std::size_t diagonal_doubles = diagonal_.size() / slices;
+  const StoredRowsInput in{&batches_, held_.rows.data(), request.damping, rules_.points_held};
+  std::vector<EliminateOutput> outputs(slices);
+  threads_.for_each(slices, [&](std::size_t s) {
+    Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
+    if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
+    const Records records = records_in(scratch.data(), chunks_);
+    double* tiles = tiles_.data() + s * tile_doubles;
+    double* diagonal = diagonal_.data() + s * diagonal_doubles;
+    std::fill_n(tiles, tile_doubles, 0.0);
+    std::fill_n(diagonal, diagonal_doubles, 0.0);
+    outputs[s] = {factors_.data(), 0, 0, 0};
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
+      const Chunk& chunk = chunks_.chunks[c];
+      row_kernels_.eliminate(in, chunk, records, outputs[s]);
+      kernels_.diagonal(batches_, chunks_, chunk, records, diagonal);
+      kernels_.pairs(chunks_, chunk, records, tiles);
+      if (rules_.brightness) add_brightness(chunk, diagonal);
+    }
+  });
+  add_slices(tiles_, slices, threads_);
+  add_slices(diagonal_, slices, threads_);
+  if (rules_.brightness) add_priors();
+
+  Step step;
+  double gradient2 = 0;
+  point_decrease_ = 0;
+  for (const EliminateOutput& out : outputs) {
+    point_decrease_ += out.point_decrease;
+    gradient2 = std::max(gradient2, out.gradient_max2);
+  }
+  step.cost = totals_.cost / 2;
+  step.plain_cost = totals_.square_sum / 2;
+  step.gradient_max = std::max(std::sqrt(gradient2 * (1 + request.damping)),
+                               stage_.gather(sums(), request.damping));
+  step.solved = std::isfinite(totals_.cost) && stage_.solve(sums(), request, nullptr, step);
+  return step;
+}
+
+/// Steps every image; returns the largest change of a block: radians, relative translation,
+/// relative brightness.
+double PhotometricSystem::step_cameras() {
+  double largest = 0;
+  for (std::size_t i = 0; i < held_.poses.size(); ++i) {
+    const std::int32_t* c = columns_.image(i);
+    double* d = &steps_[kStepRecord * i];
+    std::fill(d, d + kStepRecord, 0.0);
+    for (int k = 0; k < 8; ++k)
+      if (c[k] >= 0) d[k] = stage_.step()[c[k]];
+    const RigidMotion<double>& pose = held_.poses[i];
+    if (c[0] >= 0) tried_.poses[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
+    tried_.brightness[i] = {held_.brightness[i].a + d[6], held_.brightness[i].b + d[7]};
+    for (double change : {norm3(d + 3), norm3(d) / (norm3(pose.translation.data()) + 1e-300),
+                          std::abs(d[6]), std::abs(d[7]) / 255})
+      largest = std::max(largest, change);
+  }
+  write_views(tried_);
+  return largest;
+}
+
+Trial PhotometricSystem::trial() {
+  Trial out;
+  out.step_norm = step_cameras();
+  const RowTrialInput in{&batches_, held_.rows.data(), steps_.data(), held_.points.data(),
+                         factors_.data()};
+  std::vector<TrialOutput> outputs(chunks_.chunks.size(),
+                                   TrialOutput{tried_.points.data(), 0, 0, 0, 0});
+  threads_.for_each(outputs.size(), [&](std::size_t c) {
+    row_kernels_.back_substitute(in, chunks_.chunks[c], outputs[c]);
+  });
+  double decrease = point_decrease_ + stage_.decrease(), step2 = 0;
+  for (const TrialOutput& o : outputs) {
+    decrease += o.damping_term;
+    step2 = std::max(step2, o.step2_max);
+  }
+  tried_totals_ = collapse(tried_);
+  out.cost = tried_totals_.cost / 2;
+  out.plain_cost = tried_totals_.square_sum / 2;
+  out.predicted_decrease = decrease / 2;
+  out.step_norm = std::max(out.step_norm, std::sqrt(step2));
+  out.motion_px = median_motion();
+  return out;
+}
+
+/// Of the patches that are in their image before and after: of some two thousand, evenly spread.
+double PhotometricSystem::median_motion() const {
+  constexpr std::uint64_t kSamples = 256;
+  const std::uint64_t batches = batches_.num_batches();
+  std::vector<double> moves;
+  for (std::uint64_t k = 0; k < std::min(kSamples, batches); ++k) {
+    const std::uint64_t b = k * batches / std::min(kSamples, batches);
+    for (std::uint64_t at = 16 * b; at < 16 * b + 8; ++at) {
+      const double move =
+          std::hypot(tried_.seen[at] - held_.seen[at], tried_.seen[at + 8] - held_.seen[at + 8]);
+      if (!std::isnan(move)) moves.push_back(move);
+    }
+  }
+  if (moves.empty()) return 0;
+  const auto middle = moves.begin() + static_cast<std::ptrdiff_t>(moves.size() / 2);
+  std::nth_element(moves.begin(), middle, moves.end());
+  return *middle;
+}
+
+void PhotometricSystem::accept() {
+  std::swap(held_, tried_);
+  totals_ = tried_totals_;
+}
+
+/// Of |r| over the pixels of all patches in their images.
+double PhotometricSystem::residual_scale(double quantile) {
+  const PatchState now = state();
+  std::vector<double> sizes, patch;
+  for (std::size_t g = 0; g < batches_.groups.size(); ++g) {
+    const Batches::Group& group = batches_.groups[g];
+    for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+      for (std::uint32_t l = 0; l < group.lanes; ++l) {
+        const Sight sight{batches_.lane_point[8 * g + l], block_image_[batches_.image[8 * b + l]]};
+        if (!patch_residuals(scene_, now, sight, patch)) continue;
+        for (double r : patch) sizes.push_back(std::abs(r));
+      }
+  }
+  if (sizes.empty()) return 0;
+  const double rank = std::ceil(quantile * static_cast<double>(sizes.size())) - 1;
+  const auto at = sizes.begin() + static_cast<std::ptrdiff_t>(std::max(0.0, rank));
+  std::nth_element(sizes.begin(), at, sizes.end());
+  return *at;
+}
+
+PatchState PhotometricSystem::state() const {
+  PatchState out;
+  for (const RigidMotion<double>& pose : held_.poses)
+    out.poses.push_back({pose.rotation, pose.translation});
+  out.brightness = held_.brightness;
+  out.points = initial_points_;
+  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
+    for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l)
+      for (int d = 0; d < 3; ++d)
+        out.points[3 * std::size_t(batches_.lane_point[8 * g + l]) + d] =
+            held_.points[kPointGroup * g + 8 * d + l];
+  return out;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,100 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "geometry/rigid_motion.h"
+#include "linear/camera_stage.h"
+#include "linear/chunks.h"
+#include "linear/columns.h"
+#include "linear/kernels.h"
+#include "linear/row_kernels.h"
+#include "linear/system.h"
+#include "platform/buffer.h"
+#include "platform/parallel.h"
+#include "residual/photometric.h"
+
+namespace sheaf {
+
+struct PhotometricRules {
+  bool poses_held = false, points_held = false;
+  bool brightness = true;             ///< affine, one pair an image
+  double prior_a = 1, prior_b = 100;  ///< standard deviations of the priors a = 1, b = 0
+  bool loss_per_patch = false;
+  bool leaving_is_free = false;
+};
+
+/// Photometric rows on CPU threads: patches collapse to two rows each, which are stored; from there
+/// on points are eliminated, cameras solved and points back-substituted by the code of reprojection
+/// rows. A camera block is an image's six pose columns, then a and b.
+class PhotometricSystem : public System {
+ public:
+  /// Throws std::bad_alloc. The sights are the patches that count, in any order; those that are not
+  /// in their image when a loss is first used count as having left.
+  PhotometricSystem(const PatchScene& scene, const PatchState& state,
+                    const std::vector<Sight>& sights, const PhotometricRules& rules,
+                    const Kernels& kernels, Threads& threads);
+
+  Step propose(const StepRequest& request) override;
+  Trial trial() override;
+  void accept() override;
+  double residual_scale(double quantile) override;
+
+  /// The held state.
+  PatchState state() const;
+  /// Patches outside of their image at the held state.
+  std::uint64_t left() const { return left_; }
+  const char* solver_name() const { return solver_name_; }
+
+ private:
+  struct Half {  ///< all that belongs to one state: the held one or the one tried
+    std::vector<RigidMotion<double>> poses;
+    std::vector<Brightness> brightness;
+    Buffer<double> views, points, rows, brightness_sums, seen, costs;
+  };
+  struct Totals {
+    double cost = 0, square_sum = 0;
+    std::uint64_t left = 0;
+  };
+
+  void fill_state(const PatchState& state);
+  void allocate(Half& half) const;
+  void write_views(Half& half) const;
+  Totals collapse(Half& half);
+  void hold(const ScaledLoss& loss);
+  void set_leaving();
+  void add_brightness(const Chunk& chunk, double* diagonal) const;
+  void add_priors();
+  double prior_cost(const Half& half) const;
+  double step_cameras();
+  double median_motion() const;
+  ReducedSums sums() const { return {&chunks_, tiles_.data(), diagonal_.data()}; }
+
+  const PatchScene& scene_;
+  const PhotometricRules rules_;
+  const Kernels& kernels_;
+  const RowKernels& row_kernels_;
+  const PhotometricKernels& patch_kernels_;
+  Threads& threads_;
+  Batches batches_;
+  Chunks chunks_;
+  Columns columns_;
+  std::vector<std::uint32_t> block_image_;
+  std::vector<double> initial_points_;  ///< of points that no patch sees
+
+  Half held_, tried_;
+  Buffer<double> rays_;
+  Buffer<double> leaving_;
+  Buffer<double> factors_, tiles_, diagonal_, steps_;
+  std::vector<Buffer<double>> scratch_;
+  CameraStage stage_;
+  const char* solver_name_ = "";
+  Totals totals_, tried_totals_;
+  std::uint64_t left_ = 0;
+  double point_decrease_ = 0;
+  ScaledLoss loss_;
+  bool collapsed_ = false;  ///< held_'s rows are those of its state with loss_
+};
+
+}  // namespace sheaf

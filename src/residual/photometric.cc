@@ -1,0 +1,92 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "residual/photometric.h"
+
+#include <algorithm>
+
+#include "geometry/rigid_motion.h"
+
+namespace sheaf {
+namespace {
+
+using Vector = Vector3<double>;
+
+Vector minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+/// R^T v.
+Vector turn_back(const Matrix3<double>& R, const Vector& v) {
+  return {R[0] * v[0] + R[3] * v[1] + R[6] * v[2], R[1] * v[0] + R[4] * v[1] + R[7] * v[2],
+          R[2] * v[0] + R[5] * v[1] + R[8] * v[2]};
+}
+
+}  // namespace
+
+PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const Sight& sight) {
+  const double* X = &state.points[3 * std::size_t(sight.point)];
+  const Pose& target = state.poses[sight.image];
+  const Matrix3<double> R = matrix_from_quaternion(target.rotation);
+  Vector P;
+  if (scene.has_rays()) {
+    // (ray - s t_host) turned into the world, scaled by the inverse depth s throughout
+    const Pose& host = state.poses[scene.host[sight.point]];
+    const double* ray = &scene.rays[3 * std::size_t(sight.point)];
+    const Vector& t = host.translation;
+    const Vector world =
+        turn_back(matrix_from_quaternion(host.rotation),
+                  minus({ray[0], ray[1], ray[2]}, {X[0] * t[0], X[0] * t[1], X[0] * t[2]}));
+    P = multiply(R, world);
+    for (int i = 0; i < 3; ++i) P[i] += X[0] * target.translation[i];
+  } else {
+    P = multiply(R, {X[0], X[1], X[2]});
+    for (int i = 0; i < 3; ++i) P[i] += target.translation[i];
+  }
+  const Pinhole& k = scene.camera;
+  return {k.fx * P[0] / P[2] + k.cx, k.fy * P[1] / P[2] + k.cy, P[2]};
+}
+
+Brightness relative_brightness(const PatchScene& scene, const PatchState& state,
+                               const Sight& sight) {
+  const Brightness& target = state.brightness[sight.image];
+  if (scene.host.empty()) return target;
+  const Brightness& host = state.brightness[scene.host[sight.point]];
+  const double alpha = target.a / host.a;
+  return {alpha, target.b - alpha * host.b};
+}
+
+bool patch_residuals(const PatchScene& scene, const PatchState& state, const Sight& sight,
+                     std::vector<double>& out) {
+  const PatchPlace at = place_patch(scene, state, sight);
+  const GreyPlane& plane = scene.planes[sight.image];
+  if (!(at.depth > 0) || !patch_fits(scene.grid, plane, at.x, at.y)) return false;
+  const Brightness look = relative_brightness(scene, state, sight);
+  const PatchGrid& grid = scene.grid;
+  const float* g = &scene.references[grid.cells() * sight.point];
+  out.resize(grid.place.size());
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const std::uint32_t cell = grid.place[k];
+    const int strip = static_cast<int>(cell) / (8 * grid.rows);
+    const int dx = grid.left + 8 * strip + static_cast<int>(cell % 8);
+    const int dy = grid.top + static_cast<int>(cell) / 8 % grid.rows;
+    out[k] = sample(plane, scene.taps, at.x + dx, at.y + dy).value - (look.a * g[cell] + look.b);
+  }
+  return true;
+}
+
+PatchGrid make_grid(const Pattern& pattern) {
+  PatchGrid grid;
+  const auto [left, right] = std::minmax_element(pattern.dx.begin(), pattern.dx.end());
+  const auto [top, bottom] = std::minmax_element(pattern.dy.begin(), pattern.dy.end());
+  grid.left = *left, grid.top = *top;
+  grid.width = *right - *left + 1, grid.rows = *bottom - *top + 1;
+  grid.strips = (grid.width + 7) / 8;
+  grid.mask.assign(std::size_t(8 * grid.rows * grid.strips), 0);
+  for (std::size_t k = 0; k < pattern.size(); ++k) {
+    const int column = pattern.dx[k] - grid.left, row = pattern.dy[k] - grid.top;
+    const int cell = 8 * grid.rows * (column / 8) + 8 * row + column % 8;
+    grid.mask[static_cast<std::size_t>(cell)] = 1;
+    grid.place.push_back(static_cast<std::uint32_t>(cell));
+  }
+  return grid;
+}
+
+}  // namespace sheaf
