@@ -98,9 +98,9 @@ enum class Leaving {
 };
 
 struct PhotometricOptions {
-  int max_iterations = 50;  ///< trust region steps tried, rejected ones included, over all levels
-  double tolerance = 1e-6;  ///< stop when the relative cost decrease stays below this twice ...
-  double motion_px = 0.01;  ///< ... and the median patch moves less than this
+  int max_iterations = 100;  ///< trust region steps tried, rejected ones included, over all levels
+  double tolerance = 1e-6;   ///< stop when the relative cost decrease stays below this twice ...
+  double motion_px = 0.01;   ///< ... and the median patch moves less than this
   Interpolation interpolation = Interpolation::bicubic;
   Warp warp = Warp::automatic;
   Parametrisation parametrisation = Parametrisation::automatic;
@@ -110,8 +110,8 @@ struct PhotometricOptions {
   double prior_b = 100;  ///< of one grey level's
   Loss loss = Huber{};   ///< scale in grey levels; automatic: from the median residual
   bool loss_per_patch = false;  ///< of a patch's residuals as one vector, not of each pixel's
-  double min_zncc =
-      0;  ///< patches that correlate less at the start of a round are left out; -1: all
+  int rounds = 3;  ///< at most, on each level: what is seen is decided again at each one's start
+  double min_zncc = -1;  ///< patches that correlate less at a round's start are left out
   Leaving leaving = Leaving::truncated;
   int levels = 1;  ///< of the pyramid
   bool fix_poses = false, fix_points = false;
@@ -121,5 +121,32 @@ struct PhotometricOptions {
   std::function<bool(const Iteration&)> on_iteration{};  ///< return false to stop
   std::stop_token stop{};
 };
+
+/// A scene whose truth is known: waves of grey on a smooth height field, seen by cameras above it.
+/// Every pixel is the texture at the point where its ray meets the surface, so that images have no
+/// error but what is asked for. The same options give the same bytes on every machine.
+struct PhotometricSceneOptions {
+  std::uint32_t images = 6;
+  std::uint32_t points = 2000;
+  int width = 320, height = 240;
+  double wavelength_px = 12;  ///< of the finest wave, where a camera sees it from straight above
+  double relief = 0.04;       ///< height of the surface's waves, in depths of the cameras
+  bool eight_bit = false;     ///< round to whole grey levels within 0 to 255
+  double noise_grey = 0;      ///< standard deviation of a pixel's noise
+  double brightness = 0;      ///< size of the images' own a - 1; b is 40 times as large
+  double vignette = 0;        ///< how much darker an image's corner is
+  bool occluder = false;      ///< a square that hides part of the surface and has no points
+  double outliers = 0;        ///< fraction of points that start at a depth that is wrong by half
+  double start_px = 1;        ///< median distance of patches from their place at the start
+  std::uint64_t seed = 1;
+};
+
+struct PhotometricScene {
+  PhotometricProblem start;  ///< disturbed poses and depths, brightness (1, 0)
+  PhotometricProblem truth;
+};
+
+/// Errors: ErrorCode::usage for options that make no scene.
+Result<PhotometricScene> generate(const PhotometricSceneOptions& options);
 
 }  // namespace sheaf

@@ -13,13 +13,14 @@ namespace sheaf {
 namespace {
 
 /// Elimination sees sights as observations without a measurement.
-Batches arrange_sights(const std::vector<Sight>& sights, std::size_t blocks, std::size_t points) {
+Batches arrange_sights(const PatchScene& scene, const PatchBlocks& blocks,
+                       const std::vector<Sight>& sights, std::size_t points) {
   Problem shell;
-  shell.poses.resize(blocks);
+  shell.poses.resize(blocks.count());
   shell.points.resize(3 * points);
   shell.observation_xy.resize(2 * sights.size());
   for (const Sight& sight : sights) {
-    shell.observation_image.push_back(sight.image);
+    shell.observation_image.push_back(blocks.of(scene, sight));
     shell.observation_point.push_back(sight.point);
   }
   return arrange(shell);
@@ -28,11 +29,22 @@ Batches arrange_sights(const std::vector<Sight>& sights, std::size_t blocks, std
 Columns number_columns(std::size_t images, const PhotometricRules& rules) {
   Columns out;
   out.of_image.assign(9 * images, Columns::kFixed);
-  for (std::size_t i = 0; i < images; ++i)
+  for (std::size_t i = 0; i < images; ++i) {
+    const bool bright = rules.brightness && (i > 0 || !rules.first_brightness_held);
     for (int k = 0; k < 8; ++k)
-      if (k < 6 ? !rules.poses_held : rules.brightness) out.of_image[9 * i + k] = out.count++;
+      if (k < 6 ? !rules.poses_held : bright) out.of_image[9 * i + k] = out.count++;
+  }
   return out;
 }
+
+/// Nothing but tiles: the camera solvers ask for no more.
+Chunks only_tiles(std::vector<Tile> tiles) {
+  Chunks out;
+  out.tiles = std::move(tiles);
+  return out;
+}
+
+constexpr std::int32_t kMostDenseColumns = 1200;
 
 double norm3(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
@@ -48,37 +60,44 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
       row_kernels_(row_kernels(kernels.name)),
       patch_kernels_(photometric_kernels(kernels.name)),
       threads_(threads),
-      batches_(arrange_sights(sights, scene.num_images(), state.points.size() / 3)),
+      blocks_(scene, sights),
+      batches_(arrange_sights(scene, blocks_, sights, state.points.size() / 3)),
+      chunks_(cut_into_chunks(batches_, blocks_.count(),
+                              rules.points_held ? ChunkLists::diagonal : ChunkLists::pairs)),
+      image_chunks_(
+          only_tiles(blocks_.are_pairs() ? blocks_.image_tiles(chunks_.tiles) : chunks_.tiles)),
       columns_(number_columns(scene.num_images(), rules)),
       initial_points_(state.points),
       stage_(columns_) {
-  for (std::uint32_t i = 0; i < scene.num_images(); ++i) block_image_.push_back(i);
-  const bool couples = !rules.points_held;
-  chunks_ = cut_into_chunks(batches_, static_cast<std::uint32_t>(block_image_.size()),
-                            couples ? ChunkLists::pairs : ChunkLists::diagonal);
   fill_state(state);
-  const std::size_t slices = chunks_.slices.size() - 1;
+  const std::size_t slices = chunks_.slices.size() - 1, images = scene.num_images();
   factors_.allocate(kFactorGroup * batches_.groups.size());
   tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
-  diagonal_.allocate(slices * kDiagonalDoubles * block_image_.size());
-  steps_.allocate(kStepRecord * block_image_.size());
+  diagonal_.allocate(slices * kDiagonalDoubles * blocks_.count());
+  image_steps_.allocate(kStepRecord * images);
+  steps_.allocate(kStepRecord * blocks_.count());
+  if (blocks_.are_pairs()) {
+    image_tiles_.allocate(kTileDoubles * image_chunks_.tiles.size());
+    image_diagonal_.allocate(kDiagonalDoubles * images);
+    tile_of_.assign(images * images, -1);
+    for (std::size_t t = 0; t < image_chunks_.tiles.size(); ++t) {
+      const Tile& tile = image_chunks_.tiles[t];
+      tile_of_[tile.row * images + tile.column] = static_cast<std::int64_t>(t);
+    }
+  }
   leaving_.allocate(16 * batches_.num_batches());
   scratch_.resize(static_cast<std::size_t>(threads.count()));
-  Plan plan = plan_solver(count_work(batches_, columns_, rules.points_held));
-  if (plan.kind == SolverKind::implicit_cg) plan.kind = SolverKind::explicit_cg;
-  solver_name_ = to_string(plan.kind);
-  if (plan.kind == SolverKind::blocks)
-    stage_.set_solver(make_block_solver(columns_, threads));
-  else if (plan.kind == SolverKind::dense)
-    stage_.set_solver(make_dense_solver(columns_, kernels, threads));
-  else if (plan.kind == SolverKind::sparse)
-    stage_.set_solver(make_sparse_solver(columns_, chunks_, kernels, threads));
-  else
-    stage_.set_solver(make_explicit_solver(columns_, chunks_, false, kernels, threads));
+  // Dense up to where its factor costs about as much as the patches' pixels; then by blocks.
+  const SolverKind kind =
+      columns_.count <= kMostDenseColumns ? SolverKind::dense : SolverKind::sparse;
+  solver_name_ = to_string(kind);
+  stage_.set_solver(kind == SolverKind::dense
+                        ? make_dense_solver(columns_, kernels, threads)
+                        : make_sparse_solver(columns_, image_chunks_, kernels, threads));
 }
 
 void PhotometricSystem::allocate(Half& half) const {
-  half.views.allocate(kViewRecord * block_image_.size());
+  half.views.allocate(kViewRecord * blocks_.count());
   half.points.allocate(kPointGroup * batches_.groups.size());
   half.rows.allocate(kRowBatch * batches_.num_batches());
   half.brightness_sums.allocate(rules_.brightness ? kBrightnessBatch * batches_.num_batches() : 0);
@@ -102,26 +121,14 @@ void PhotometricSystem::fill_state(const PatchState& state) {
         if (scene_.has_rays()) rays_[kPointGroup * g + 8 * d + l] = scene_.rays[point + d];
       }
     }
-  write_views(held_);
-}
-
-void PhotometricSystem::write_views(Half& half) const {
-  for (std::size_t i = 0; i < block_image_.size(); ++i) {
-    double* view = &half.views[kViewRecord * i];
-    const Matrix3<double> R = matrix_from_quaternion(half.poses[i].rotation);
-    std::copy(R.begin(), R.end(), view);
-    std::copy(half.poses[i].translation.begin(), half.poses[i].translation.end(), view + 9);
-    view[12] = half.brightness[i].a;
-    view[13] = half.brightness[i].b;
-    std::fill(view + 14, view + kViewRecord, 0.0);
-  }
+  blocks_.write_views(held_.poses, held_.brightness, held_.views.data());
 }
 
 /// Chunks write what is theirs; their costs are added in order.
 PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
   const PhotometricInput in{&batches_,
                             scene_.planes.data(),
-                            block_image_.data(),
+                            blocks_.targets().data(),
                             half.views.data(),
                             half.points.data(),
                             scene_.has_rays() ? rays_.data() : nullptr,
@@ -132,7 +139,8 @@ PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
                             scene_.taps,
                             loss_,
                             rules_.loss_per_patch,
-                            rules_.brightness};
+                            rules_.brightness,
+                            scene_.warped};
   std::vector<PhotometricOutput> outputs(
       chunks_.chunks.size(), {half.rows.data(), half.brightness_sums.data(), half.seen.data(),
                               half.costs.data(), 0, 0, 0});
@@ -202,10 +210,11 @@ void PhotometricSystem::add_brightness(const Chunk& chunk, double* diagonal) con
 }
 
 void PhotometricSystem::add_priors() {
+  double* diagonal = blocks_.are_pairs() ? image_diagonal_.data() : diagonal_.data();
   const double wa = 1 / (rules_.prior_a * rules_.prior_a);
   const double wb = 1 / (rules_.prior_b * rules_.prior_b);
   for (std::size_t i = 0; i < held_.brightness.size(); ++i) {
-    double* block = &diagonal_[kDiagonalDoubles * i];
+    double* block = diagonal + kDiagonalDoubles * i;
     block[8 * 6 + 6] += wa;
     block[8 * 7 + 7] += wb;
     block[72 + 6] += wa * (held_.brightness[i].a - 1);
@@ -224,13 +233,11 @@ double PhotometricSystem::prior_cost(const Half& half) const {
   return sum;
 }
 
-Step PhotometricSystem::propose(const StepRequest& request) {
-  hold(request.loss);
-  const std::size_t slices = chunks_.slices.size() - 1;
+void PhotometricSystem::eliminate(double damping, std::vector<EliminateOutput>& outputs) {
+  const std::size_t slices = outputs.size();
   const std::size_t tile_doubles = tiles_.size() / slices;
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
-  const StoredRowsInput in{&batches_, held_.rows.data(), request.damping, rules_.points_held};
-  std::vector<EliminateOutput> outputs(slices);
+  const StoredRowsInput in{&batches_, held_.rows.data(), damping, rules_.points_held};
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
@@ -250,6 +257,21 @@ Step PhotometricSystem::propose(const StepRequest& request) {
   });
   add_slices(tiles_, slices, threads_);
   add_slices(diagonal_, slices, threads_);
+}
+
+void PhotometricSystem::fold_to_images() {
+  image_tiles_.fill(0);
+  image_diagonal_.fill(0);
+  blocks_.fold(held_.poses, held_.brightness, scene_.num_images(),
+               {&chunks_.tiles, tiles_.data(), diagonal_.data(), &tile_of_, image_tiles_.data(),
+                image_diagonal_.data()});
+}
+
+Step PhotometricSystem::propose(const StepRequest& request) {
+  hold(request.loss);
+  std::vector<EliminateOutput> outputs(chunks_.slices.size() - 1);
+  eliminate(request.damping, outputs);
+  if (blocks_.are_pairs()) fold_to_images();
   if (rules_.brightness) add_priors();
 
   Step step;
@@ -273,7 +295,7 @@ double PhotometricSystem::step_cameras() {
   double largest = 0;
   for (std::size_t i = 0; i < held_.poses.size(); ++i) {
     const std::int32_t* c = columns_.image(i);
-    double* d = &steps_[kStepRecord * i];
+    double* d = &image_steps_[kStepRecord * i];
     std::fill(d, d + kStepRecord, 0.0);
     for (int k = 0; k < 8; ++k)
       if (c[k] >= 0) d[k] = stage_.step()[c[k]];
@@ -284,7 +306,8 @@ double PhotometricSystem::step_cameras() {
                           std::abs(d[6]), std::abs(d[7]) / 255})
       largest = std::max(largest, change);
   }
-  write_views(tried_);
+  blocks_.write_views(tried_.poses, tried_.brightness, tried_.views.data());
+  blocks_.step(held_.poses, held_.brightness, image_steps_.data(), steps_.data());
   return largest;
 }
 
@@ -344,7 +367,8 @@ double PhotometricSystem::residual_scale(double quantile) {
     const Batches::Group& group = batches_.groups[g];
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
       for (std::uint32_t l = 0; l < group.lanes; ++l) {
-        const Sight sight{batches_.lane_point[8 * g + l], block_image_[batches_.image[8 * b + l]]};
+        const Sight sight{batches_.lane_point[8 * g + l],
+                          blocks_.targets()[batches_.image[8 * b + l]]};
         if (!patch_residuals(scene_, now, sight, patch)) continue;
         for (double r : patch) sizes.push_back(std::abs(r));
       }

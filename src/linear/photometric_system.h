@@ -9,6 +9,7 @@
 #include "linear/chunks.h"
 #include "linear/columns.h"
 #include "linear/kernels.h"
+#include "linear/patch_blocks.h"
 #include "linear/row_kernels.h"
 #include "linear/system.h"
 #include "platform/buffer.h"
@@ -19,8 +20,9 @@ namespace sheaf {
 
 struct PhotometricRules {
   bool poses_held = false, points_held = false;
-  bool brightness = true;             ///< affine, one pair an image
-  double prior_a = 1, prior_b = 100;  ///< standard deviations of the priors a = 1, b = 0
+  bool brightness = true;              ///< affine, one pair an image
+  bool first_brightness_held = false;  ///< where only brightness between images can be told
+  double prior_a = 1, prior_b = 100;   ///< standard deviations of the priors a = 1, b = 0
   bool loss_per_patch = false;
   bool leaving_is_free = false;
 };
@@ -60,16 +62,20 @@ class PhotometricSystem : public System {
 
   void fill_state(const PatchState& state);
   void allocate(Half& half) const;
-  void write_views(Half& half) const;
   Totals collapse(Half& half);
   void hold(const ScaledLoss& loss);
   void set_leaving();
   void add_brightness(const Chunk& chunk, double* diagonal) const;
   void add_priors();
   double prior_cost(const Half& half) const;
+  void eliminate(double damping, std::vector<EliminateOutput>& outputs);
+  void fold_to_images();
   double step_cameras();
   double median_motion() const;
-  ReducedSums sums() const { return {&chunks_, tiles_.data(), diagonal_.data()}; }
+  ReducedSums sums() const {
+    return {&image_chunks_, blocks_.are_pairs() ? image_tiles_.data() : tiles_.data(),
+            blocks_.are_pairs() ? image_diagonal_.data() : diagonal_.data()};
+  }
 
   const PatchScene& scene_;
   const PhotometricRules rules_;
@@ -77,16 +83,20 @@ class PhotometricSystem : public System {
   const RowKernels& row_kernels_;
   const PhotometricKernels& patch_kernels_;
   Threads& threads_;
-  Batches batches_;
+  PatchBlocks blocks_;
+  Batches batches_;  ///< what these call an image is a block
   Chunks chunks_;
+  Chunks image_chunks_;  ///< tiles of images alone: what the camera solver sees
   Columns columns_;
-  std::vector<std::uint32_t> block_image_;
   std::vector<double> initial_points_;  ///< of points that no patch sees
 
   Half held_, tried_;
   Buffer<double> rays_;
   Buffer<double> leaving_;
-  Buffer<double> factors_, tiles_, diagonal_, steps_;
+  Buffer<double> factors_, tiles_, diagonal_;
+  Buffer<double> image_tiles_, image_diagonal_;  ///< folded; empty where blocks are images
+  std::vector<std::int64_t> tile_of_;            ///< of two images
+  Buffer<double> image_steps_, steps_;           ///< kStepRecord per image, per block
   std::vector<Buffer<double>> scratch_;
   CameraStage stage_;
   const char* solver_name_ = "";

@@ -51,6 +51,7 @@ struct PatchAt {
   double x, y;  ///< of its middle
   double alpha, beta;
   const float* reference;
+  double P[3], along[3], down[3];  ///< of a warped patch: its middle, and a pixel right and down
 };
 
 HWY_INLINE V load_greys(const float* p) {
@@ -101,71 +102,177 @@ HWY_INLINE V across(const V* weights, V a, V b, V c, V d) {
   return fma(weights[0], a, fma(weights[1], b, fma(weights[2], c, hn::Mul(weights[3], d))));
 }
 
+/// One image read at a part's pixels, and what they stand for.
+struct LanePixels {
+  V mask, reference, grey, gx, gy;
+};
+
+template <bool kBrightness>
+HWY_INLINE void add_pixels(const LanePixels& at, V alpha, V beta, const LossLanes& loss, bool weigh,
+                           V* sums) {
+  const V g = at.reference, gx = at.gx, gy = at.gy;
+  const V r = hn::Mul(at.mask, hn::Sub(at.grey, fma(alpha, g, beta)));
+  const V square = hn::Mul(r, r);
+  V w = at.mask, rho = square;
+  if (weigh) {
+    const Rho of = rho_lanes(loss, square);
+    w = hn::Mul(w, of.weight), rho = of.value;
+  }
+  const V wx = hn::Mul(w, gx), wy = hn::Mul(w, gy);
+  sums[kGxx] = fma(wx, gx, sums[kGxx]);
+  sums[kGxy] = fma(wx, gy, sums[kGxy]);
+  sums[kGyy] = fma(wy, gy, sums[kGyy]);
+  sums[kGxr] = fma(wx, r, sums[kGxr]);
+  sums[kGyr] = fma(wy, r, sums[kGyr]);
+  sums[kCost] = hn::Add(rho, sums[kCost]);
+  sums[kSquare] = hn::Add(square, sums[kSquare]);
+  if constexpr (kBrightness) {
+    const V wg = hn::Mul(w, g);
+    sums[kGxg] = fma(wx, g, sums[kGxg]);
+    sums[kGyg] = fma(wy, g, sums[kGyg]);
+    sums[kGx1] = hn::Add(wx, sums[kGx1]);
+    sums[kGy1] = hn::Add(wy, sums[kGy1]);
+    sums[kGg] = fma(wg, g, sums[kGg]);
+    sums[kG1] = hn::Add(wg, sums[kG1]);
+    sums[k11] = hn::Add(w, sums[k11]);
+    sums[kGr] = fma(wg, r, sums[kGr]);
+    sums[k1r] = fma(w, r, sums[k1r]);
+  }
+}
+
+/// Where the rows of a strip's part lie: they all have the same fraction of a pixel.
+struct Strip {
+  const float* corner;  ///< one pixel left of and above the first
+  std::ptrdiff_t stride;
+  const float *reference, *mask;
+  int rows;
+};
+
 /// Eight columns of a part, from a strip's top row down.
 template <bool kBrightness>
-HWY_INLINE void sum_strip(const PhotometricInput& in, const float* corner, std::ptrdiff_t stride,
-                          const LaneTaps& x, const LaneTaps& y, V alpha, V beta,
-                          const float* reference, const float* mask, const LossLanes& loss,
-                          V* sums) {
+HWY_INLINE void sum_strip(const Strip& strip, const LaneTaps& x, const LaneTaps& y, V alpha, V beta,
+                          const LossLanes& loss, bool weigh, V* sums) {
   RowTaps r0, r1, r2, r3;
-  r0.read(corner, x);
-  r1.read(corner + stride, x);
-  r2.read(corner + 2 * stride, x);
-  const bool weigh = !in.loss_per_patch && loss.kind != LossKind::none;
-  for (int row = 0; row < in.grid->rows; ++row) {
-    r3.read(corner + (row + 3) * stride, x);
-    const V m = load_greys(mask + 8 * row), g = load_greys(reference + 8 * row);
-    const V I = across(y.value, r0.value, r1.value, r2.value, r3.value);
-    const V gx = across(y.value, r0.slope, r1.slope, r2.slope, r3.slope);
-    const V gy = across(y.slope, r0.value, r1.value, r2.value, r3.value);
-    const V r = hn::Mul(m, hn::Sub(I, fma(alpha, g, beta)));
-    const V square = hn::Mul(r, r);
-    V w = m, rho = square;
-    if (weigh) {
-      const Rho of = rho_lanes(loss, square);
-      w = hn::Mul(m, of.weight), rho = of.value;
-    }
-    const V wx = hn::Mul(w, gx), wy = hn::Mul(w, gy);
-    sums[kGxx] = fma(wx, gx, sums[kGxx]);
-    sums[kGxy] = fma(wx, gy, sums[kGxy]);
-    sums[kGyy] = fma(wy, gy, sums[kGyy]);
-    sums[kGxr] = fma(wx, r, sums[kGxr]);
-    sums[kGyr] = fma(wy, r, sums[kGyr]);
-    sums[kCost] = hn::Add(rho, sums[kCost]);
-    sums[kSquare] = hn::Add(square, sums[kSquare]);
-    if constexpr (kBrightness) {
-      const V wg = hn::Mul(w, g);
-      sums[kGxg] = fma(wx, g, sums[kGxg]);
-      sums[kGyg] = fma(wy, g, sums[kGyg]);
-      sums[kGx1] = hn::Add(wx, sums[kGx1]);
-      sums[kGy1] = hn::Add(wy, sums[kGy1]);
-      sums[kGg] = fma(wg, g, sums[kGg]);
-      sums[kG1] = hn::Add(wg, sums[kG1]);
-      sums[k11] = hn::Add(w, sums[k11]);
-      sums[kGr] = fma(wg, r, sums[kGr]);
-      sums[k1r] = fma(w, r, sums[k1r]);
-    }
+  r0.read(strip.corner, x);
+  r1.read(strip.corner + strip.stride, x);
+  r2.read(strip.corner + 2 * strip.stride, x);
+  for (int row = 0; row < strip.rows; ++row) {
+    r3.read(strip.corner + (row + 3) * strip.stride, x);
+    const LanePixels at{load_greys(strip.mask + 8 * row), load_greys(strip.reference + 8 * row),
+                        across(y.value, r0.value, r1.value, r2.value, r3.value),
+                        across(y.value, r0.slope, r1.slope, r2.slope, r3.slope),
+                        across(y.slope, r0.value, r1.value, r2.value, r3.value)};
+    add_pixels<kBrightness>(at, alpha, beta, loss, weigh, sums);
     r0 = r1, r1 = r2, r2 = r3;
+  }
+}
+
+/// Weights of four taps, each lane with a fraction of its own; tap_weights is the scalar twin.
+struct SpreadTaps {
+  V value[4], slope[4];
+  HWY_INLINE SpreadTaps(Taps taps, V f) {
+    const V one = set(1.0), half = set(0.5), left = hn::Sub(one, f);
+    if (taps != Taps::catmull_rom) {
+      value[0] = value[3] = zero(), value[1] = left, value[2] = f;
+      const bool central = taps == Taps::bilinear_central;
+      slope[0] = central ? hn::Neg(hn::Mul(half, left)) : zero();
+      slope[1] = central ? hn::Neg(hn::Mul(half, f)) : set(-1.0);
+      slope[2] = central ? hn::Mul(half, left) : one;
+      slope[3] = central ? hn::Mul(half, f) : zero();
+      return;
+    }
+    const V f2 = hn::Mul(f, f);
+    value[0] = hn::Mul(f, fms(f, fnma(half, f, one), half));
+    value[1] = fma(f2, fms(set(1.5), f, set(2.5)), one);
+    value[2] = hn::Mul(f, fma(f, fnma(set(1.5), f, set(2.0)), half));
+    value[3] = hn::Mul(hn::Mul(f2, half), hn::Sub(f, one));
+    slope[0] = fms(f, fnma(set(1.5), f, set(2.0)), half);
+    slope[1] = hn::Mul(f, fms(set(4.5), f, set(5.0)));
+    slope[2] = fma(f, fnma(set(4.5), f, set(4.0)), half);
+    slope[3] = hn::Mul(f, fms(set(1.5), f, one));
+  }
+};
+
+/// Lanes of doubles that are whole numbers, as indices of floats.
+using GreyTag = hn::Rebind<float, D>;
+using IndexTag = hn::Rebind<std::int32_t, D>;
+
+/// The plane at (x, y) of each lane; positions outside are moved to the border.
+HWY_INLINE void read_spread(const GreyPlane& plane, Taps taps, V x, V y, LanePixels& at) {
+  const V left = set(-2.0), right = set(plane.width() + 1.0), bottom = set(plane.height() + 1.0);
+  x = hn::Min(hn::Max(x, left), right);
+  y = hn::Min(hn::Max(y, left), bottom);
+  const V x0 = hn::Floor(x), y0 = hn::Floor(y);
+  const SpreadTaps wx(taps, hn::Sub(x, x0)), wy(taps, hn::Sub(y, y0));
+  const V place = fma(y0, set(static_cast<double>(plane.stride())), x0);
+  const auto index = hn::DemoteTo(IndexTag(), place);
+  at.grey = at.gx = at.gy = zero();
+  for (int r = 0; r < 4; ++r) {
+    const float* row = plane.at(-1, r - 1);
+    V greys[4];
+    for (int c = 0; c < 4; ++c)
+      greys[c] = hn::PromoteTo(D(), hn::GatherIndex(GreyTag(), row + c, index));
+    const V value = across(wx.value, greys[0], greys[1], greys[2], greys[3]);
+    const V slope = across(wx.slope, greys[0], greys[1], greys[2], greys[3]);
+    at.grey = fma(wy.value[r], value, at.grey);
+    at.gx = fma(wy.value[r], slope, at.gx);
+    at.gy = fma(wy.slope[r], value, at.gy);
+  }
+}
+
+/// The patch with each pixel projected by itself: P of pixel (dx, dy) is P + dx along + dy down.
+template <bool kBrightness>
+HWY_INLINE void sum_warped(const PhotometricInput& in, const PatchAt& patch, const LossLanes& loss,
+                           bool weigh, double* to) {
+  const PatchGrid& grid = *in.grid;
+  alignas(64) static constexpr double kColumns[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  const V alpha = set(patch.alpha), beta = set(patch.beta);
+  for (int p = 0; p < kParts; ++p) {
+    V sums[kPatchSums<kBrightness>];
+    for (V& s : sums) s = zero();
+    for (int strip = 0; strip < grid.strips; ++strip) {
+      const V dx = hn::Add(load(kColumns + p * kLanes), set(grid.left + 8.0 * strip));
+      for (int row = 0; row < grid.rows; ++row) {
+        const V dy = set(static_cast<double>(grid.top + row));
+        V P[3];
+        for (int i = 0; i < 3; ++i)
+          P[i] = fma(dx, set(patch.along[i]), fma(dy, set(patch.down[i]), set(patch.P[i])));
+        const V iz = hn::Div(set(1.0), P[2]);
+        const int cells = 8 * grid.rows * strip + 8 * row + p * kLanes;
+        LanePixels at;
+        at.mask = load_greys(grid.mask.data() + cells);
+        at.reference = load_greys(patch.reference + cells);
+        read_spread(*patch.plane, in.taps,
+                    fma(set(in.camera.fx), hn::Mul(P[0], iz), set(in.camera.cx)),
+                    fma(set(in.camera.fy), hn::Mul(P[1], iz), set(in.camera.cy)), at);
+        add_pixels<kBrightness>(at, alpha, beta, loss, weigh, sums);
+      }
+    }
+    for (int k = 0; k < kPatchSums<kBrightness>; ++k)
+      store(sums[k], to + kSumStride * k + p * kLanes);
   }
 }
 
 /// The sums of one patch that fits, eight lanes of each: sum k to `to` + kSumStride k.
 template <bool kBrightness>
 HWY_INLINE void sum_patch(const PhotometricInput& in, const PatchAt& at, double* to) {
+  const LossLanes loss(in.loss);
+  const bool weigh = !in.loss_per_patch && loss.kind != LossKind::none;
+  if (in.warped) return sum_warped<kBrightness>(in, at, loss, weigh, to);
   const PatchGrid& grid = *in.grid;
   const double x0 = std::floor(at.x), y0 = std::floor(at.y);
   const LaneTaps x(tap_weights(in.taps, at.x - x0)), y(tap_weights(in.taps, at.y - y0));
   const float* corner =
       at.plane->at(static_cast<int>(x0) + grid.left - 1, static_cast<int>(y0) + grid.top - 1);
-  const LossLanes loss(in.loss);
   const V alpha = set(at.alpha), beta = set(at.beta);
   for (int p = 0; p < kParts; ++p) {
     V sums[kPatchSums<kBrightness>];
     for (V& s : sums) s = zero();
-    for (int strip = 0; strip < grid.strips; ++strip) {
-      const int cells = 8 * grid.rows * strip + p * kLanes;
-      sum_strip<kBrightness>(in, corner + 8 * strip + p * kLanes, at.plane->stride(), x, y, alpha,
-                             beta, at.reference + cells, grid.mask.data() + cells, loss, sums);
+    for (int k = 0; k < grid.strips; ++k) {
+      const int cells = 8 * grid.rows * k + p * kLanes;
+      const Strip strip{corner + 8 * k + p * kLanes, at.plane->stride(), at.reference + cells,
+                        grid.mask.data() + cells, grid.rows};
+      sum_strip<kBrightness>(strip, x, y, alpha, beta, loss, weigh, sums);
     }
     for (int k = 0; k < kPatchSums<kBrightness>; ++k)
       store(sums[k], to + kSumStride * k + p * kLanes);

@@ -21,7 +21,8 @@ Vector turn_back(const Matrix3<double>& R, const Vector& v) {
 
 }  // namespace
 
-PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const Sight& sight) {
+PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const Sight& sight, int dx,
+                       int dy) {
   const double* X = &state.points[3 * std::size_t(sight.point)];
   const Pose& target = state.poses[sight.image];
   const Matrix3<double> R = matrix_from_quaternion(target.rotation);
@@ -33,7 +34,8 @@ PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const S
     const Vector& t = host.translation;
     const Vector world =
         turn_back(matrix_from_quaternion(host.rotation),
-                  minus({ray[0], ray[1], ray[2]}, {X[0] * t[0], X[0] * t[1], X[0] * t[2]}));
+                  minus({ray[0] + dx / scene.camera.fx, ray[1] + dy / scene.camera.fy, ray[2]},
+                        {X[0] * t[0], X[0] * t[1], X[0] * t[2]}));
     P = multiply(R, world);
     for (int i = 0; i < 3; ++i) P[i] += X[0] * target.translation[i];
   } else {
@@ -53,11 +55,25 @@ Brightness relative_brightness(const PatchScene& scene, const PatchState& state,
   return {alpha, target.b - alpha * host.b};
 }
 
+bool is_seen(const PatchScene& scene, const PatchState& state, const Sight& sight) {
+  const PatchGrid& grid = scene.grid;
+  const GreyPlane& plane = scene.planes[sight.image];
+  const PatchPlace middle = place_patch(scene, state, sight);
+  if (!(middle.depth > 0) || !patch_fits(grid, plane, middle.x, middle.y)) return false;
+  if (!scene.warped) return true;
+  for (int dx : {grid.left, grid.right()})
+    for (int dy : {grid.top, grid.bottom()}) {
+      const PatchPlace at = place_patch(scene, state, sight, dx, dy);
+      if (!(at.depth > 0) || !pixel_fits(plane, at.x, at.y)) return false;
+    }
+  return true;
+}
+
 bool patch_residuals(const PatchScene& scene, const PatchState& state, const Sight& sight,
                      std::vector<double>& out) {
-  const PatchPlace at = place_patch(scene, state, sight);
+  if (!is_seen(scene, state, sight)) return false;
+  const PatchPlace middle = place_patch(scene, state, sight);
   const GreyPlane& plane = scene.planes[sight.image];
-  if (!(at.depth > 0) || !patch_fits(scene.grid, plane, at.x, at.y)) return false;
   const Brightness look = relative_brightness(scene, state, sight);
   const PatchGrid& grid = scene.grid;
   const float* g = &scene.references[grid.cells() * sight.point];
@@ -67,7 +83,9 @@ bool patch_residuals(const PatchScene& scene, const PatchState& state, const Sig
     const int strip = static_cast<int>(cell) / (8 * grid.rows);
     const int dx = grid.left + 8 * strip + static_cast<int>(cell % 8);
     const int dy = grid.top + static_cast<int>(cell) / 8 % grid.rows;
-    out[k] = sample(plane, scene.taps, at.x + dx, at.y + dy).value - (look.a * g[cell] + look.b);
+    const PatchPlace at = scene.warped ? place_patch(scene, state, sight, dx, dy)
+                                       : PatchPlace{middle.x + dx, middle.y + dy, middle.depth};
+    out[k] = sample(plane, scene.taps, at.x, at.y).value - (look.a * g[cell] + look.b);
   }
   return true;
 }

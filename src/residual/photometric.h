@@ -29,6 +29,18 @@ struct PatchGrid {
 };
 PatchGrid make_grid(const Pattern& pattern);
 
+/// Whether a patch whose middle is at (x, y) lies in the image with one pixel around it, which
+/// its slopes need. False for what is not finite.
+inline bool patch_fits(const PatchGrid& grid, const GreyPlane& plane, double x, double y) {
+  return x + grid.left >= 1 && x + grid.right() <= plane.width() - 2 && y + grid.top >= 1 &&
+         y + grid.bottom() <= plane.height() - 2;
+}
+
+/// Likewise of one pixel.
+inline bool pixel_fits(const GreyPlane& plane, double x, double y) {
+  return x >= 1 && x <= plane.width() - 2 && y >= 1 && y <= plane.height() - 2;
+}
+
 /// What does not move while poses, points and brightness do.
 struct PatchScene {
   Pinhole camera;
@@ -38,6 +50,7 @@ struct PatchScene {
   std::vector<std::uint32_t> host;  ///< by point, or empty: points in the world
   std::vector<double> rays;         ///< 3 per point with hosts: (x, y, 1)
   Taps taps = Taps::catmull_rom;
+  bool warped = false;  ///< each pixel is projected by itself, at the depth of the patch's middle
 
   std::size_t num_images() const { return planes.size(); }
   bool has_rays() const { return !rays.empty(); }
@@ -55,22 +68,14 @@ struct Sight {
   std::uint32_t point, image;
 };
 
-/// Whether a patch whose middle is at (x, y) lies in the image with one pixel around it, which
-/// its slopes need. False for what is not finite.
-inline bool patch_fits(const PatchGrid& grid, const GreyPlane& plane, double x, double y) {
-  return x + grid.left >= 1 && x + grid.right() <= plane.width() - 2 && y + grid.top >= 1 &&
-         y + grid.bottom() <= plane.height() - 2;
-}
-
 /// Where a sight's patch has its middle in its image, pixels; a depth of 0 or less is behind.
 struct PatchPlace {
   double x, y, depth;
 };
-PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const Sight& sight);
-inline bool is_seen(const PatchScene& scene, const PatchState& state, const Sight& sight) {
-  const PatchPlace at = place_patch(scene, state, sight);
-  return at.depth > 0 && patch_fits(scene.grid, scene.planes[sight.image], at.x, at.y);
-}
+/// (dx, dy): of a pixel of a warped patch.
+PatchPlace place_patch(const PatchScene& scene, const PatchState& state, const Sight& sight,
+                       int dx = 0, int dy = 0);
+bool is_seen(const PatchScene& scene, const PatchState& state, const Sight& sight);
 
 /// The brightness (alpha, beta) that takes a sight's reference to its image.
 Brightness relative_brightness(const PatchScene& scene, const PatchState& state,
@@ -103,6 +108,7 @@ struct PhotometricInput {
   ScaledLoss loss;
   bool loss_per_patch;
   bool brightness;  ///< alpha and beta have columns
+  bool warped;      ///< each pixel is projected by itself; with rays only
 };
 
 /// Of the brightness alone, with what the rows hold taken out: 8 doubles a lane's field, five

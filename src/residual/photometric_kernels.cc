@@ -104,6 +104,28 @@ HWY_INLINE LaneJacobian rows_of(const Whitened& w, const Pinhole& camera, const 
   return j;
 }
 
+/// Where the pixels of one lane's patch go; false where a corner of it leaves the image.
+HWY_INLINE bool warp_patch(const PhotometricInput& in, std::uint32_t block, const double* P,
+                           PatchAt& patch) {
+  const double* R = in.views + kViewRecord * block;
+  const PatchGrid& grid = *in.grid;
+  for (int i = 0; i < 3; ++i) {
+    patch.P[i] = P[i];
+    patch.along[i] = R[3 * i] / in.camera.fx;
+    patch.down[i] = R[3 * i + 1] / in.camera.fy;
+  }
+  for (int dx : {grid.left, grid.right()})
+    for (int dy : {grid.top, grid.bottom()}) {
+      double Q[3];
+      for (int i = 0; i < 3; ++i) Q[i] = P[i] + dx * patch.along[i] + dy * patch.down[i];
+      const Pinhole& k = in.camera;
+      if (!(Q[2] > 0) ||
+          !pixel_fits(*patch.plane, k.fx * (Q[0] / Q[2]) + k.cx, k.fy * (Q[1] / Q[2]) + k.cy))
+        return false;
+    }
+  return true;
+}
+
 struct CollapseSums {
   V cost[kParts], square[kParts];
   std::uint64_t left = 0;
@@ -126,18 +148,30 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& 
   const Place at = place_points(in.camera, c, d, s);
   double* seen = out.seen + 16 * b + lane;
   store(at.x, seen), store(at.y, seen + 8);
-  alignas(64) double depth[8], alpha[8], beta[8], inside[8];
-  store(at.P[2], depth), store(c[12], alpha), store(c[13], beta);
+  alignas(64) double P[3][8], alpha[8], beta[8], inside[8];
+  for (int i = 0; i < 3; ++i) store(at.P[i], P[i]);
+  store(c[12], alpha), store(c[13], beta);
   for (int l = 0; l < kLanes; ++l) {
     double* to = scratch + 8 * l;
     const bool used = static_cast<std::uint32_t>(lane + l) < group.lanes;
-    const GreyPlane& plane = in.planes[in.block_image[block[l]]];
-    const bool fits = used && depth[l] > 0 && patch_fits(*in.grid, plane, seen[l], seen[8 + l]);
+    PatchAt patch{&in.planes[in.block_image[block[l]]],
+                  seen[l],
+                  seen[8 + l],
+                  alpha[l],
+                  beta[l],
+                  nullptr,
+                  {},
+                  {},
+                  {}};
+    bool fits = used && P[2][l] > 0 && patch_fits(*in.grid, *patch.plane, seen[l], seen[8 + l]);
+    if (kRays && in.warped && fits) {
+      const double middle[3] = {P[0][l], P[1][l], P[2][l]};
+      fits = warp_patch(in, block[l], middle, patch);
+    }
     inside[l] = fits ? 1 : 0;
     if (fits) {
       const std::size_t point = batches.lane_point[8 * g + static_cast<std::size_t>(lane + l)];
-      const PatchAt patch{&plane,   seen[l], seen[8 + l],
-                          alpha[l], beta[l], in.references + in.grid->cells() * point};
+      patch.reference = in.references + in.grid->cells() * point;
       sum_patch<kBrightness>(in, patch, to);
     } else {
       for (int k = 0; k < kPatchSums<kBrightness>; ++k) store_zeros(to + kSumStride * k);

@@ -51,6 +51,7 @@ void PatchStatistics::measure_after(const PatchState& state) {
   std::vector<double> now, patch;
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     if (!patch_residuals(scene_, state, seen_[i], patch)) {
+      ++left_;
       const double* first = &first_[pixels * i];
       patch.assign(first, first + pixels);
       const double mean = before_.rms * std::sqrt(static_cast<double>(pixels));

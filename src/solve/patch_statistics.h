@@ -25,12 +25,14 @@ class PatchStatistics {
 
   const Grey& before() const { return before_; }
   const Grey& after() const { return after_; }
+  std::uint64_t left() const { return left_; }  ///< patches outside after
 
  private:
   PatchScene scene_;
   std::vector<Sight> seen_;
   std::vector<double> first_;  ///< residuals of before, patch by patch
   Grey before_, after_;
+  std::uint64_t left_ = 0;
 };
 
 }  // namespace sheaf

@@ -2,58 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <new>
 
 #include "linear/kernel_table.h"
 #include "linear/photometric_system.h"
 #include "platform/clock.h"
 #include "sheaf/solve.h"
+#include "solve/patch_level.h"
 #include "solve/patch_statistics.h"
 #include "solve/trust_region.h"
 
 namespace sheaf {
 namespace {
-
-Taps taps_of(Interpolation interpolation) {
-  switch (interpolation) {
-    case Interpolation::bilinear:
-      return Taps::bilinear_central;
-    case Interpolation::bilinear_exact:
-      return Taps::bilinear;
-    case Interpolation::bicubic:
-      break;
-  }
-  return Taps::catmull_rom;
-}
-
-PatchScene scene_of(const PhotometricProblem& problem, const PhotometricOptions& options) {
-  PatchScene scene;
-  scene.camera = problem.camera;
-  for (const GreyImage& image : problem.images)
-    scene.planes.emplace_back(image.width, image.height, image.pixels.data());
-  scene.grid = make_grid(problem.patch);
-  scene.taps = taps_of(options.interpolation);
-  const std::size_t cells = scene.grid.cells(), pixels = problem.patch.size();
-  scene.references.assign(cells * problem.num_points(), 0);
-  for (std::size_t i = 0; i < problem.num_points(); ++i)
-    for (std::size_t k = 0; k < pixels; ++k)
-      scene.references[cells * i + scene.grid.place[k]] = problem.patches[pixels * i + k];
-  return scene;
-}
-
-PatchState state_of(const PhotometricProblem& problem) {
-  PatchState state{problem.poses, problem.brightness, problem.points};
-  state.brightness.resize(problem.poses.size());
-  return state;
-}
-
-std::vector<Sight> all_sights(const PhotometricProblem& problem) {
-  std::vector<Sight> sights;
-  for (std::uint32_t i = 0; i < problem.num_points(); ++i)
-    for (std::uint32_t j = 0; j < problem.images.size(); ++j)
-      if (!problem.has_hosts() || problem.host[i] != j) sights.push_back({i, j});
-  return sights;
-}
 
 /// The usual constants keep 95% of the least-squares efficiency on one component.
 double pixel_tuning_constant(LossKind kind) {
@@ -76,133 +38,223 @@ double pixel_tuning_constant(LossKind kind) {
 
 class Refinement {
  public:
-  Refinement(PhotometricProblem& problem, const PhotometricOptions& options)
+  Refinement(PhotometricProblem& problem, const PhotometricOptions& options, const Pattern& pattern)
       : problem_(problem),
         options_(options),
+        pattern_(pattern),
         threads_(options.threads),
         kernels_(*available_kernels().front()),
-        scene_(scene_of(problem, options)),
-        state_(state_of(problem)) {}
+        rays_(uses_rays(problem, options)),
+        state_(state_of(problem, rays_)) {}
 
   PhotometricSummary run() {
     Summary& solve = summary_.solve;
     solve.simd = kernels_.name;
     solve.threads = threads_.count();
     solve.loss = options_.loss.kind;
-    select_sights();
-    PatchStatistics statistics(scene_, seen_);
+    const PatchScene finest = scene_of_level(problem_, options_, pattern_, 0);
+    const std::vector<Sight> seen = sights_in(finest);
+    summary_.patches_total = all_sights(problem_).size();
+    summary_.patches_visible = seen.size();
+    PatchStatistics statistics(finest, seen);
     statistics.measure_before(state_);
-    const ScaledLoss loss = fit_brightness();
-    descend(loss);
+    for (int level = options_.levels - 1; level > 0; --level)
+      if (!refine(scene_of_level(problem_, options_, pattern_, level), level)) break;
+    if (options_.levels == 1 || converged()) refine(finest, 0);
     solve.solve_s = clock_.seconds() - solve.setup_s;
     statistics.measure_after(state_);
-    summary_.initial_rms_grey = statistics.before().rms;
-    summary_.initial_median_grey = statistics.before().median;
-    summary_.final_rms_grey = statistics.after().rms;
-    summary_.final_median_grey = statistics.after().median;
-    problem_.poses = state_.poses;
-    problem_.points = state_.points;
-    problem_.brightness = state_.brightness;
+    report(statistics);
+    store_state(state_, rays_, problem_);
     return summary_;
   }
 
  private:
   PhotometricRules rules() const {
-    return {options_.fix_poses,
-            options_.fix_points,
-            options_.affine_brightness,
-            options_.prior_a,
-            options_.prior_b,
-            options_.loss_per_patch,
-            options_.leaving == Leaving::free};
+    PhotometricRules out;
+    out.poses_held = options_.fix_poses;
+    out.points_held = options_.fix_points;
+    out.brightness = options_.affine_brightness;
+    out.first_brightness_held = problem_.has_hosts();
+    out.prior_a = options_.prior_a;
+    out.prior_b = options_.prior_b;
+    out.loss_per_patch = options_.loss_per_patch;
+    out.leaving_is_free = options_.leaving == Leaving::free;
+    return out;
   }
 
-  SolveOptions loop_options() const {
+  SolveOptions loop_options(int level) const {
     SolveOptions out;
     out.max_iterations = options_.max_iterations;
-    out.tolerance = options_.tolerance;
+    out.tolerance = level > 0 ? std::numeric_limits<double>::infinity() : options_.tolerance;
     out.initial_damping = options_.initial_damping > 0 ? options_.initial_damping
                                                        : default_damping(problem_.poses.size());
+    if (summary_.solve.iterations.size() > 1)
+      out.initial_damping = std::max(out.initial_damping, summary_.solve.iterations.back().damping);
     out.time_limit_s = options_.time_limit_s;
     out.on_iteration = options_.on_iteration;
     out.stop = options_.stop;
     return out;
   }
 
-  void select_sights() {
-    const std::vector<Sight> all = all_sights(problem_);
-    summary_.patches_total = all.size();
-    std::copy_if(all.begin(), all.end(), std::back_inserter(seen_),
-                 [&](const Sight& sight) { return is_seen(scene_, state_, sight); });
-    summary_.patches_visible = seen_.size();
-    sights_ = options_.leaving == Leaving::free ? all : seen_;
+  std::vector<Sight> sights_in(const PatchScene& scene) const {
+    std::vector<Sight> out;
+    for (const Sight& sight : all_sights(problem_))
+      if (is_seen(scene, state_, sight)) out.push_back(sight);
+    return out;
   }
 
-  /// Brightness alone, poses and points held, then the loss's scale from what is left.
-  ScaledLoss fit_brightness() {
-    const bool automatic =
-        options_.loss.kind != LossKind::none && options_.loss.scale_px == kAutomaticScale;
+  /// Those that count in a round.
+  std::vector<Sight> sights_of_round(const PatchScene& scene) const {
+    if (options_.leaving == Leaving::free) return all_sights(problem_);
+    std::vector<Sight> out = sights_in(scene);
+    if (options_.min_zncc > -1)
+      std::erase_if(out, [&](const Sight& sight) {
+        return correlation(scene, state_, sight) < options_.min_zncc;
+      });
+    return out;
+  }
+
+  /// Rounds of steps on one level, each with the patches seen at its start, until these stay the
+  /// same. False when the run is to end.
+  bool refine(const PatchScene& scene, int level) {
+    std::vector<Sight> sights = sights_of_round(scene);
+    const ScaledLoss loss = scaled_loss(scene, sights);
+    for (int round = 1; descend(scene, sights, loss, level); ++round) {
+      if (round >= options_.rounds || options_.leaving == Leaving::free) return true;
+      std::vector<Sight> next = sights_of_round(scene);
+      if (!differ(sights, next)) return true;
+      sights = std::move(next);
+    }
+    return false;
+  }
+
+  /// By more than one patch in fifty.
+  static bool differ(const std::vector<Sight>& a, const std::vector<Sight>& b) {
+    const auto before = [](const Sight& x, const Sight& y) {
+      return x.point != y.point ? x.point < y.point : x.image < y.image;
+    };
+    std::vector<Sight> changed;
+    std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(),
+                                  std::back_inserter(changed), before);
+    return 50 * changed.size() > a.size();
+  }
+
+  /// An automatic scale follows from what is left once brightness is fitted with poses and points
+  /// held.
+  ScaledLoss scaled_loss(const PatchScene& scene, const std::vector<Sight>& sights) {
     ScaledLoss loss{options_.loss.kind, options_.loss.scale_px};
-    if (options_.affine_brightness && automatic) {
-      PhotometricRules held = rules();
-      held.poses_held = held.points_held = true;
-      PhotometricSystem system(scene_, state_, seen_, held, kernels_, threads_);
+    sigma_ = 0;
+    if (loss.kind == LossKind::none || loss.scale_px != kAutomaticScale) return loss;
+    PhotometricRules held = rules();
+    held.poses_held = held.points_held = true;
+    PhotometricSystem system(scene, state_, sights, held, kernels_, threads_);
+    if (options_.affine_brightness && !brightness_fitted_) {
       SolveOptions steps;
       steps.max_iterations = 10;
       steps.tolerance = 1e-4;
-      Summary ignored;
-      minimize(system, {LossKind::huber, 10}, steps, clock_, ignored);
+      Summary unseen;
+      minimize(system, {LossKind::huber, kFirstScale}, steps, clock_, unseen);
       state_ = system.state();
+      brightness_fitted_ = true;
     }
-    if (automatic) {
-      PhotometricSystem system(scene_, state_, seen_, rules(), kernels_, threads_);
-      const double sigma = std::max(kLeastSigma, kSigmaPerMedian * system.residual_scale(0.5));
-      const double pixels =
-          options_.loss_per_patch ? std::sqrt(static_cast<double>(problem_.patch.size())) : 1;
-      loss.scale_px = pixel_tuning_constant(loss.kind) * sigma * pixels;
-      sigma_ = sigma;
-    }
+    sigma_ = std::max(kLeastSigma, kSigmaPerMedian * system.residual_scale(0.5));
+    const double pixels =
+        options_.loss_per_patch ? std::sqrt(static_cast<double>(pattern_.size())) : 1;
+    loss.scale_px = pixel_tuning_constant(loss.kind) * sigma_ * pixels;
     return loss;
   }
 
-  void descend(const ScaledLoss& loss) {
+  /// Steps until they converge; false where they did not.
+  bool descend(const PatchScene& scene, const std::vector<Sight>& sights, const ScaledLoss& loss,
+               int level) {
     Summary& solve = summary_.solve;
-    PhotometricSystem system(scene_, state_, sights_, rules(), kernels_, threads_);
-    solve.setup_s = clock_.seconds();
+    PhotometricSystem system(scene, state_, sights, rules(), kernels_, threads_);
+    if (solve.rounds.empty()) solve.setup_s = clock_.seconds();
     solve.solver = system.solver_name();
     LossRound round;
     round.scale_px = loss.kind == LossKind::none ? 0 : loss.scale_px;
     round.sigma_px = sigma_;
     solve.rounds.push_back(round);
-    minimize(system, loss, loop_options(), clock_, solve, options_.motion_px);
-    solve.rounds.back().initial_cost = solve.initial_cost;
-    solve.rounds.back().final_cost = solve.final_cost;
-    solve.rounds.back().steps = static_cast<int>(solve.iterations.size()) - 1;
+    const std::size_t before = solve.iterations.size();
+    minimize(system, loss, loop_options(level), clock_, solve,
+             level > 0 ? kCoarseMotion : options_.motion_px);
+    LossRound& now = solve.rounds.back();
+    now.initial_cost =
+        before < solve.iterations.size() ? solve.iterations[before].start_cost : solve.final_cost;
+    now.final_cost = solve.final_cost;
+    now.steps = static_cast<int>(solve.iterations.size() - before) - (before == 0);
     state_ = system.state();
+    return converged();
+  }
+
+  bool converged() const {
+    const Termination end = summary_.solve.termination;
+    return end == Termination::cost_converged || end == Termination::gradient_converged ||
+           end == Termination::step_converged;
+  }
+
+  void report(const PatchStatistics& statistics) {
+    summary_.initial_rms_grey = statistics.before().rms;
+    summary_.initial_median_grey = statistics.before().median;
+    summary_.final_rms_grey = statistics.after().rms;
+    summary_.final_median_grey = statistics.after().median;
+    summary_.patches_left = statistics.left();
   }
 
   static constexpr double kSigmaPerMedian = 1.4826022185056018;
-  static constexpr double kLeastSigma = 1;  ///< grey levels: no camera is better
+  static constexpr double kLeastSigma = 1;      ///< grey levels: no camera is better
+  static constexpr double kFirstScale = 10;     ///< grey levels: while brightness alone is fitted
+  static constexpr double kCoarseMotion = 0.1;  ///< pixels of a coarse level
 
   const Stopwatch clock_;
   PhotometricProblem& problem_;
   const PhotometricOptions& options_;
+  const Pattern pattern_;
   Threads threads_;
   const Kernels& kernels_;
-  PatchScene scene_;
+  const bool rays_;
   PatchState state_;
-  std::vector<Sight> sights_, seen_;
+  bool brightness_fitted_ = false;
   double sigma_ = 0;
   PhotometricSummary summary_;
 };
+
+Result<Pattern> check(const PhotometricProblem& problem, const PhotometricOptions& options) {
+  const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
+  if (Result<void> valid = validate(problem); !valid.ok()) return valid.error();
+  if (!problem.has_hosts()) {
+    if (options.levels > 1)
+      return usage("a pyramid needs points with hosts: stored patches have one size only");
+    if (options.parametrisation == Parametrisation::inverse_depth)
+      return usage("points on rays (inverse depth) need hosts");
+    if (options.warp == Warp::inverse_depth)
+      return usage("the warp by inverse depth needs hosts: stored patches name no image");
+  }
+  if (options.warp == Warp::inverse_depth && options.parametrisation == Parametrisation::xyz)
+    return usage("the warp by inverse depth is for points on rays, not for xyz");
+  if (options.levels < 1 || options.levels > 6) return usage("levels are 1 to 6");
+  if (options.rounds < 1) return usage("rounds are 1 or more");
+  for (std::size_t i = 0; i < problem.images.size(); ++i)
+    if (std::min(problem.images[i].width, problem.images[i].height) >> (options.levels - 1) < 16)
+      return usage("image " + std::to_string(i) + " has fewer than 16 x 16 pixels at level " +
+                   std::to_string(options.levels));
+  if (options.loss.graduated) return usage("graduated losses are not for photometric rows");
+  if (!problem.has_hosts()) return problem.patch;
+  const PatchState state = state_of(problem, true);
+  for (std::size_t i = 0; i < problem.num_points(); ++i)
+    if (const double s = state.points[3 * i]; !(s > 0 && std::isfinite(s)))
+      return usage("point " + std::to_string(i) + " is not in front of its host image");
+  return make_pattern(options.pattern);
+}
 
 }  // namespace
 
 Result<PhotometricSummary> refine_photometric(PhotometricProblem& problem,
                                               const PhotometricOptions& options) {
-  if (Result<void> valid = validate(problem); !valid.ok()) return valid.error();
+  const Result<Pattern> pattern = check(problem, options);
+  if (!pattern.ok()) return pattern.error();
   try {
-    return Refinement(problem, options).run();
+    return Refinement(problem, options, pattern.value()).run();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for these images");
   }

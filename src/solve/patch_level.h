@@ -1,0 +1,30 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "residual/photometric.h"
+#include "sheaf/photometric.h"
+
+namespace sheaf {
+
+/// Whether points are one number each, on the rays of their hosts.
+bool uses_rays(const PhotometricProblem& problem, const PhotometricOptions& options);
+
+/// The problem as level 0 (as it is), 1 (half the size), ... of a pyramid sees it: images,
+/// intrinsics, and patches taken from the hosts at that level.
+PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOptions& options,
+                          const Pattern& pattern, int level);
+
+PatchState state_of(const PhotometricProblem& problem, bool rays);
+void store_state(const PatchState& state, bool rays, PhotometricProblem& problem);
+
+/// Every point in every image that is not its host.
+std::vector<Sight> all_sights(const PhotometricProblem& problem);
+
+/// Zero-normalised cross-correlation of a sight's patch and its image, in [-1, 1]; 0 where either
+/// has no texture; -1 where the patch is outside.
+double correlation(const PatchScene& scene, const PatchState& state, const Sight& sight);
+
+}  // namespace sheaf
