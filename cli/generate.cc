@@ -8,6 +8,7 @@
 #include <string>
 
 #include "counting_sink.h"
+#include "generate_photometric.h"
 #include "inspect/statistics.h"
 #include "interrupt.h"
 #include "json_document.h"
@@ -26,6 +27,7 @@ struct Arguments {
   CommonOptions common;
   SceneOptions scene;
   FamilyArguments family;
+  PhotometricSceneArguments photometric;
   std::string out, truth;
 };
 
@@ -112,7 +114,8 @@ int run(const Arguments& arguments) {
 void add_generate(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand("generate", "make a synthetic scene, disturbed");
-  verb.add_option("OUT", arguments->out, "the disturbed start: BAL, .gz and .bz2 compressed")
+  verb.add_option("OUT", arguments->out,
+                  "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --photometric")
       ->type_name("FILE")
       ->required();
   verb.add_option("--truth", arguments->truth,
@@ -120,12 +123,24 @@ void add_generate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   add_scene_options(verb, arguments->scene);
   add_family_options(verb, arguments->family);
+  add_photometric_scene_options(verb, arguments->photometric);
   add_common_options(verb, arguments->common);
   verb.footer(
       "Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt\n"
       "\nA synthetic scene of a published problem's size:\n"
-      "  sheaf generate street.txt --like ladybug-138");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      "  sheaf generate street.txt --like ladybug-138\n"
+      "\nImages of a textured surface, poses and points for sheaf photometric:\n"
+      "  sheaf generate scene --photometric --truth truth");
+  verb.callback([arguments, &exit_code, &verb] {
+    if (!arguments->photometric.chosen) {
+      exit_code = run(*arguments);
+      return;
+    }
+    if (verb.count("--outliers") > 0)
+      arguments->photometric.scene.outliers = arguments->family.outliers;
+    exit_code = generate_photometric(verb, arguments->photometric, arguments->scene, arguments->out,
+                                     arguments->truth, arguments->common.json);
+  });
 }
 
 }  // namespace sheaf

@@ -83,8 +83,10 @@ void add_photometric(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb =
       *app.add_subcommand("photometric", "refine poses and points from the pixels of images");
-  verb.add_option("IN", arguments->in,
-                  "folder with poses.txt, points.txt and 0.png, 1.png, ... (docs/photometric.md)")
+  verb.add_option(
+          "IN", arguments->in,
+          "folder with poses.txt, points.txt and 0.png, 1.png, ... (docs/photometric.md has "
+          "the formats)")
       ->type_name("FOLDER")
       ->required();
   verb.add_option("-o,--output", arguments->out,
@@ -93,8 +95,8 @@ void add_photometric(CLI::App& app, int& exit_code) {
   add_photometric_options(verb, arguments->photometric);
   add_common_options(verb, arguments->common);
   verb.footer(
-      "Example:\n  sheaf photometric images --intrinsics 277.34,291.402,312.234,239.777 -o "
-      "refined");
+      "Example:\n  sheaf photometric scene -o refined --json photometric.json\n"
+      "\nA scene to try it on:\n  sheaf generate scene --photometric");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -19,6 +19,14 @@ const std::map<std::string, Interpolation> kInterpolations = {
     {"bilinear", Interpolation::bilinear},
     {"bilinear-exact", Interpolation::bilinear_exact}};
 
+const std::map<std::string, Warp> kWarps = {{"auto", Warp::automatic},
+                                            {"translation", Warp::translation},
+                                            {"inverse-depth", Warp::inverse_depth}};
+const std::map<std::string, Parametrisation> kParametrisations = {
+    {"auto", Parametrisation::automatic},
+    {"xyz", Parametrisation::xyz},
+    {"inverse-depth", Parametrisation::inverse_depth}};
+
 std::string parse_intrinsics(const std::string& text, Pinhole& out) {
   std::array<double, 4> v{};
   const char *p = text.data(), *end = p + text.size();
@@ -36,9 +44,9 @@ std::string parse_intrinsics(const std::string& text, Pinhole& out) {
 
 void add_model_options(CLI::App& verb, PhotometricArguments& a) {
   verb.add_option("--intrinsics", a.intrinsics,
-                  "fx,fy,cx,cy of all images, pixels; the first pixel's centre is (0, 0)")
+                  "fx,fy,cx,cy of all images, pixels, instead of intrinsics.txt; the first pixel's "
+                  "centre is (0, 0)")
       ->type_name("FX,FY,CX,CY")
-      ->required()
       ->check(CLI::Validator(
           [](std::string& text) {
             Pinhole ignored;
@@ -84,12 +92,49 @@ void add_model_options(CLI::App& verb, PhotometricArguments& a) {
       ->check(one_of({"poses", "points"}));
 }
 
+/// How points stand for patches, and which of these count.
+void add_patch_options(CLI::App& verb, PhotometricArguments& a) {
+  verb.add_option("--points", a.points,
+                  "xyz (three numbers a point) or inverse-depth (one, along the ray of its host "
+                  "image); auto: inverse-depth where hosts.txt names hosts")
+      ->type_name("NAME")
+      ->check(one_of({"auto", "xyz", "inverse-depth"}))
+      ->capture_default_str();
+  verb.add_option("--warp", a.warp,
+                  "translation (a patch moves as a whole) or inverse-depth (each of its pixels is "
+                  "projected by itself); auto: as --points")
+      ->type_name("NAME")
+      ->check(one_of({"auto", "translation", "inverse-depth"}))
+      ->capture_default_str();
+  verb.add_option("--pattern", a.pattern, "pixels of a patch that is taken from a host image")
+      ->type_name("NAME")
+      ->check(one_of(pattern_names()))
+      ->capture_default_str();
+  verb.add_option("--levels", a.levels,
+                  "of the pyramid, from coarse to fine; more than 1 need hosts.txt")
+      ->type_name("N")
+      ->check(whole_number_from(1, "a whole number from 1 to 6"))
+      ->capture_default_str();
+  verb.add_option("--rounds", a.rounds,
+                  "at most, on each level: which patches are seen is decided again at each start")
+      ->type_name("N")
+      ->check(whole_number_from(1, "a whole number from 1 up"))
+      ->capture_default_str();
+  verb.add_option("--min-zncc", a.min_zncc,
+                  "leave patches out that correlate less than this with their image at a round's "
+                  "start; -1: none")
+      ->type_name("C")
+      ->check(number_in(-1, 1, true, "a number from -1 to 1"))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
   const double inf = std::numeric_limits<double>::infinity();
   const double most = std::numeric_limits<double>::max();
   add_model_options(verb, a);
+  add_patch_options(verb, a);
   verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
       ->type_name("N")
       ->check(whole_number_from(0, "a whole number from 0 up"))
@@ -125,13 +170,20 @@ PhotometricOptions photometric_options(const PhotometricArguments& a) {
   parse_loss(a.loss, options.loss);
   options.loss_per_patch = a.loss_on == "patch";
   options.leaving = a.leaving == "free" ? Leaving::free : Leaving::truncated;
+  options.warp = kWarps.at(a.warp);
+  options.parametrisation = kParametrisations.at(a.points);
+  options.pattern = a.pattern;
+  options.min_zncc = a.min_zncc;
+  options.levels = a.levels;
+  options.rounds = a.rounds;
   options.fix_poses = a.fix == "poses";
   options.fix_points = a.fix == "points";
   options.initial_damping = a.initial_damping;
   return options;
 }
 
-Pinhole camera_of(const PhotometricArguments& a) {
+std::optional<Pinhole> camera_of(const PhotometricArguments& a) {
+  if (a.intrinsics.empty()) return {};
   Pinhole camera;
   parse_intrinsics(a.intrinsics, camera);
   return camera;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "sheaf/photometric.h"
@@ -21,6 +22,12 @@ struct PhotometricArguments {
   std::string loss = "huber:auto";
   std::string loss_on = "pixel";
   std::string leaving = "truncated";
+  std::string warp = "auto";
+  std::string points = "auto";
+  std::string pattern = PhotometricOptions().pattern;
+  double min_zncc = PhotometricOptions().min_zncc;
+  int levels = PhotometricOptions().levels;
+  int rounds = PhotometricOptions().rounds;
   std::string fix;
   double initial_damping = 0;
 };
@@ -29,6 +36,6 @@ void add_photometric_options(CLI::App& verb, PhotometricArguments& arguments);
 
 /// Everything but threads and callbacks. The arguments have passed their validators.
 PhotometricOptions photometric_options(const PhotometricArguments& arguments);
-Pinhole camera_of(const PhotometricArguments& arguments);
+std::optional<Pinhole> camera_of(const PhotometricArguments& arguments);
 
 }  // namespace sheaf

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,19 +53,23 @@ struct PhotometricFolder {
   PhotometricProblem problem;
   std::string format;                        ///< "direct"
   std::vector<double> times;                 ///< one for each image, as the folder states them
-  std::vector<std::filesystem::path> files;  ///< of the images
+  std::vector<std::filesystem::path> files;  ///< of the images, or empty: not from files
   double read_s = 0;                         ///< seconds spent reading and decoding
 };
 
-/// Reads a folder of images with poses and points: poses.txt (time, cam_from_world translation,
-/// quaternion x y z w), points.txt (X Y Z and 16 grey levels), 0.png, 1.png, ... Errors:
-/// ErrorCode::unreadable_input.
+/// Reads a folder of images with poses and points:
+///   poses.txt       a line per image: time, cam_from_world translation, quaternion x y z w
+///   points.txt      a line per point: X Y Z, then the grey levels of its 4x4 patch
+///   0.png, 1.png    an image per pose
+///   intrinsics.txt  fx fy cx cy, unless `camera` gives them
+///   hosts.txt       if there: a line per point, the image and pixel x y that its patch is taken
+///   from brightness.txt  if there: a line per image, a b
+/// Errors: ErrorCode::unreadable_input, or usage where intrinsics are missing.
 Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
-                                           const Pinhole& camera);
+                                           const std::optional<Pinhole>& camera = {});
 
-/// Writes the refined state in the same format into a folder, which is made where it is not there:
-/// poses.txt, points.txt, the images as they were, and brightness.txt (a b of each image). Errors:
-/// ErrorCode::unwritable_output.
+/// Writes the state in the same format into a folder, which is made where it is not there; images
+/// that were read are copied, others become PNG of 8 bits. Errors: ErrorCode::unwritable_output.
 Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path);
 
 }  // namespace sheaf

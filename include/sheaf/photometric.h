@@ -48,18 +48,18 @@ struct Pattern {
 Result<Pattern> make_pattern(const std::string& name);
 std::vector<std::string> pattern_names();
 
-/// Images, their poses, and points whose grey patches are known: stored with the points, or seen in
-/// a host image.
+/// Images, their poses, and points whose grey patches are known: stored with the points, seen in a
+/// host image, or both.
 struct PhotometricProblem {
   Pinhole camera;                 ///< of all images
   std::vector<GreyImage> images;  ///< one for each pose
   std::vector<Pose> poses;        ///< cam_from_world, +z forward
   std::vector<double> points;     ///< 3 x points: X, Y, Z, scene units
-  /// Either these: grey levels of the `patch` pixels of each point ...
+  /// Grey levels of the `patch` pixels of each point: what points as xyz are compared with ...
   Pattern patch;
   std::vector<float> patches;  ///< patch.size() x points, or empty
-  /// ... or these: the image that a point's patch is taken from, and where. The point lies on that
-  /// pixel's ray.
+  /// ... and the image that a point's patch is taken from, and where: what points on rays need. The
+  /// point lies on that pixel's ray.
   std::vector<std::uint32_t> host;     ///< one for each point, or empty
   std::vector<double> host_xy;         ///< 2 x points, pixels
   std::vector<Brightness> brightness;  ///< one for each image, or empty: all (1, 0)
@@ -87,7 +87,7 @@ enum class Warp {
 
 enum class Parametrisation {
   automatic,      ///< inverse_depth where points have a host, else xyz
-  xyz,            ///< three numbers a point, in the world
+  xyz,            ///< three numbers a point, in the world; stored patches
   inverse_depth,  ///< one number a point, along its host's ray
 };
 

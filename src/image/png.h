@@ -15,6 +15,9 @@ namespace sheaf {
 /// without pixels.
 Result<std::string> encode_png(const Image& image);
 
+/// A grey or colour PNG of 8 or 16 bits. Errors as above.
+Result<std::string> encode_png(const Raster& raster);
+
 /// The samples of a PNG file, grey or colour, of 8 or 16 bits; palettes become colours, fewer bits
 /// become 8, transparency is left out. Errors: ErrorCode::unreadable_input with `name` in front.
 Result<Raster> decode_png(std::string_view bytes, const std::string& name);

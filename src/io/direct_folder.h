@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -10,13 +11,26 @@
 
 namespace sheaf {
 
-/// The two text files of a folder as `read_photometric` expects it, from memory; `name` is what
+/// The text files of a folder as `read_photometric` expects it, from memory; `name` is what
 /// messages call them.
 ///   poses   a line per image: time, cam_from_world translation, quaternion x y z w
 ///   points  a line per point: X Y Z, then 16 grey levels, dx in -2..1 outside, dy in -2..1 inside
+/// and those that may be beside them:
+///   hosts       a line per point: image, x and y of its pixel; the 16 grey levels are then not
+///   used brightness  a line per image: a b intrinsics  fx fy cx cy
 Result<void> parse_direct_poses(std::string_view text, const std::string& name,
                                 PhotometricFolder& folder);
 Result<void> parse_direct_points(std::string_view text, const std::string& name,
                                  PhotometricFolder& folder);
+
+Result<void> parse_direct_hosts(std::string_view text, const std::string& name,
+                                PhotometricFolder& folder);
+Result<void> parse_direct_brightness(std::string_view text, const std::string& name,
+                                     PhotometricFolder& folder);
+Result<void> parse_direct_intrinsics(std::string_view text, const std::string& name,
+                                     PhotometricFolder& folder);
+
+/// A file's bytes, whatever its size turns out to be.
+Result<std::string> bytes_of(const std::filesystem::path& path);
 
 }  // namespace sheaf

@@ -58,8 +58,8 @@ Result<void> check_references(const PhotometricProblem& p) {
     return wrong("the problem has no points, or not three numbers for each");
   for (std::size_t i = 0; i < points; ++i)
     if (!all_finite(&p.points[3 * i], 3)) return wrong(entry("point", i) + " is not finite");
-  if (p.has_hosts() == !p.patches.empty())
-    return wrong("points need either stored patches or host images, not both");
+  if (!p.has_hosts() && p.patches.empty())
+    return wrong("points need stored patches, or host images to take them from");
   if (!p.patches.empty()) {
     if (p.patch.size() == 0 || p.patch.dx.size() != p.patch.dy.size() ||
         p.patches.size() != points * p.patch.size())
@@ -67,8 +67,8 @@ Result<void> check_references(const PhotometricProblem& p) {
     for (std::size_t i = 0; i < p.patches.size(); ++i)
       if (!std::isfinite(p.patches[i]))
         return wrong(entry("the patch of point", i / p.patch.size()) + " is not finite");
-    return {};
   }
+  if (!p.has_hosts()) return {};
   if (p.host.size() != points || p.host_xy.size() != 2 * points)
     return wrong("hosts are not one image and one pixel for each point");
   for (std::size_t i = 0; i < points; ++i)

@@ -109,6 +109,19 @@ void place_points(const PhotometricSceneOptions& options, const WaveSurface& sur
   }
 }
 
+/// The course's sixteen pixels, as the hosts show them.
+void store_patches(PhotometricProblem& truth) {
+  truth.patch = make_pattern("4x4").value();
+  for (std::size_t i = 0; i < truth.num_points(); ++i) {
+    const GreyImage& image = truth.images[truth.host[i]];
+    for (std::size_t k = 0; k < truth.patch.size(); ++k) {
+      const auto x = static_cast<std::size_t>(truth.host_xy[2 * i] + truth.patch.dx[k]);
+      const auto y = static_cast<std::size_t>(truth.host_xy[2 * i + 1] + truth.patch.dy[k]);
+      truth.patches.push_back(image.pixels[y * std::size_t(image.width) + x]);
+    }
+  }
+}
+
 /// Poses and depths that are off by `size` times what moves a patch by about a pixel.
 PhotometricProblem disturbed(const PhotometricSceneOptions& options,
                              const PhotometricProblem& truth, double size) {
@@ -197,6 +210,7 @@ Result<PhotometricScene> generate(const PhotometricSceneOptions& options) {
     truth.brightness.push_back(i == 0 ? Brightness{} : Brightness{1 + size * a, 40 * size * b});
     truth.images.push_back(render(options, surface, lenses[i], truth.brightness[i], noise));
   }
+  store_patches(truth);
   const double unit_px = median_offset(disturbed(options, truth, 1e-3), truth);
   scene.start = disturbed(options, truth, options.start_px * 1e-3 / unit_px);
   scene.start.images = truth.images;

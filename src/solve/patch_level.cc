@@ -54,7 +54,9 @@ void take_references(const PhotometricProblem& problem, const Pattern& pattern, 
 }  // namespace
 
 bool uses_rays(const PhotometricProblem& problem, const PhotometricOptions& options) {
-  return problem.has_hosts() && options.parametrisation != Parametrisation::xyz;
+  return options.parametrisation == Parametrisation::automatic
+             ? problem.has_hosts()
+             : options.parametrisation == Parametrisation::inverse_depth;
 }
 
 PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOptions& options,
@@ -66,17 +68,16 @@ PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOp
     scene.planes.push_back(plane_of_level(image, level));
   scene.grid = make_grid(pattern);
   scene.taps = taps_of(options.interpolation);
-  scene.host = problem.host;
   const std::size_t cells = scene.grid.cells(), pixels = pattern.size();
   scene.references.assign(cells * problem.num_points(), 0);
-  if (problem.has_hosts()) {
-    take_references(problem, pattern, level, scene);
-  } else {
+  if (!uses_rays(problem, options)) {
     for (std::size_t i = 0; i < problem.num_points(); ++i)
       for (std::size_t p = 0; p < pixels; ++p)
         scene.references[cells * i + scene.grid.place[p]] = problem.patches[pixels * i + p];
+    return scene;
   }
-  if (!uses_rays(problem, options)) return scene;
+  take_references(problem, pattern, level, scene);
+  scene.host = problem.host;
   scene.warped = options.warp != Warp::translation;
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     for (double c : {(problem.host_xy[2 * i] - problem.camera.cx) / problem.camera.fx,
@@ -121,11 +122,11 @@ void store_state(const PatchState& state, bool rays, PhotometricProblem& problem
   }
 }
 
-std::vector<Sight> all_sights(const PhotometricProblem& problem) {
+std::vector<Sight> all_sights(const PhotometricProblem& problem, bool rays) {
   std::vector<Sight> sights;
   for (std::uint32_t i = 0; i < problem.num_points(); ++i)
     for (std::uint32_t j = 0; j < problem.images.size(); ++j)
-      if (!problem.has_hosts() || problem.host[i] != j) sights.push_back({i, j});
+      if (!rays || problem.host[i] != j) sights.push_back({i, j});
   return sights;
 }
 

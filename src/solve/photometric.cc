@@ -54,7 +54,7 @@ class Refinement {
     solve.loss = options_.loss.kind;
     const PatchScene finest = scene_of_level(problem_, options_, pattern_, 0);
     const std::vector<Sight> seen = sights_in(finest);
-    summary_.patches_total = all_sights(problem_).size();
+    summary_.patches_total = all_sights(problem_, rays_).size();
     summary_.patches_visible = seen.size();
     PatchStatistics statistics(finest, seen);
     statistics.measure_before(state_);
@@ -74,7 +74,7 @@ class Refinement {
     out.poses_held = options_.fix_poses;
     out.points_held = options_.fix_points;
     out.brightness = options_.affine_brightness;
-    out.first_brightness_held = problem_.has_hosts();
+    out.first_brightness_held = rays_;
     out.prior_a = options_.prior_a;
     out.prior_b = options_.prior_b;
     out.loss_per_patch = options_.loss_per_patch;
@@ -98,14 +98,14 @@ class Refinement {
 
   std::vector<Sight> sights_in(const PatchScene& scene) const {
     std::vector<Sight> out;
-    for (const Sight& sight : all_sights(problem_))
+    for (const Sight& sight : all_sights(problem_, rays_))
       if (is_seen(scene, state_, sight)) out.push_back(sight);
     return out;
   }
 
   /// Those that count in a round.
   std::vector<Sight> sights_of_round(const PatchScene& scene) const {
-    if (options_.leaving == Leaving::free) return all_sights(problem_);
+    if (options_.leaving == Leaving::free) return all_sights(problem_, rays_);
     std::vector<Sight> out = sights_in(scene);
     if (options_.min_zncc > -1)
       std::erase_if(out, [&](const Sight& sight) {
@@ -222,16 +222,13 @@ class Refinement {
 Result<Pattern> check(const PhotometricProblem& problem, const PhotometricOptions& options) {
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   if (Result<void> valid = validate(problem); !valid.ok()) return valid.error();
-  if (!problem.has_hosts()) {
-    if (options.levels > 1)
-      return usage("a pyramid needs points with hosts: stored patches have one size only");
-    if (options.parametrisation == Parametrisation::inverse_depth)
-      return usage("points on rays (inverse depth) need hosts");
-    if (options.warp == Warp::inverse_depth)
-      return usage("the warp by inverse depth needs hosts: stored patches name no image");
-  }
-  if (options.warp == Warp::inverse_depth && options.parametrisation == Parametrisation::xyz)
-    return usage("the warp by inverse depth is for points on rays, not for xyz");
+  const bool rays = uses_rays(problem, options);
+  if (rays && !problem.has_hosts()) return usage("points on rays (inverse depth) need hosts");
+  if (!rays && problem.patches.empty()) return usage("points as xyz need stored patches");
+  if (!rays && options.levels > 1)
+    return usage("a pyramid needs points on the rays of hosts: stored patches have one size only");
+  if (!rays && options.warp == Warp::inverse_depth)
+    return usage("the warp by inverse depth needs points on the rays of hosts");
   if (options.levels < 1 || options.levels > 6) return usage("levels are 1 to 6");
   if (options.rounds < 1) return usage("rounds are 1 or more");
   for (std::size_t i = 0; i < problem.images.size(); ++i)
@@ -239,7 +236,7 @@ Result<Pattern> check(const PhotometricProblem& problem, const PhotometricOption
       return usage("image " + std::to_string(i) + " has fewer than 16 x 16 pixels at level " +
                    std::to_string(options.levels));
   if (options.loss.graduated) return usage("graduated losses are not for photometric rows");
-  if (!problem.has_hosts()) return problem.patch;
+  if (!rays) return problem.patch;
   const PatchState state = state_of(problem, true);
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     if (const double s = state.points[3 * i]; !(s > 0 && std::isfinite(s)))

@@ -30,9 +30,9 @@ Problem shell_of(const PhotometricProblem& p) {
 
 std::array<double, 2> project(const PhotometricProblem& p, std::size_t image, std::size_t point) {
   const Pose& pose = p.poses[image];
-  const Vector3<double> P =
-      multiply(matrix_from_quaternion(pose.rotation),
-               Vector3<double>{p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
+  const Vector3<double> P = multiply(
+      matrix_from_quaternion(pose.rotation),
+      Vector3<double>{p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
   const double z = P[2] + pose.translation[2];
   return {p.camera.fx * (P[0] + pose.translation[0]) / z + p.camera.cx,
           p.camera.fy * (P[1] + pose.translation[1]) / z + p.camera.cy};
@@ -82,11 +82,13 @@ TEST(Photometric, Explore) {
           const Errors before = errors_of(scene.start, scene.truth);
           const auto summary = refine_photometric(scene.start, options).value();
           const Errors after = errors_of(scene.start, scene.truth);
-          std::printf("start %.0f levels %d interp %d %s: %.3f px %.2e rad -> %.5f px %.2e rad; it %zu rms %.3f -> %.4f, %s %.2fs\n",
-                      start, levels, int(interpolation), pattern, before.reprojection_px,
-                      before.rotation_rad, after.reprojection_px, after.rotation_rad,
-                      summary.solve.iterations.size() - 1, summary.initial_rms_grey,
-                      summary.final_rms_grey, to_string(summary.solve.termination), summary.solve.solve_s);
+          std::printf(
+              "start %.0f levels %d interp %d %s: %.3f px %.2e rad -> %.5f px %.2e rad; it %zu rms "
+              "%.3f -> %.4f, %s %.2fs\n",
+              start, levels, int(interpolation), pattern, before.reprojection_px,
+              before.rotation_rad, after.reprojection_px, after.rotation_rad,
+              summary.solve.iterations.size() - 1, summary.initial_rms_grey, summary.final_rms_grey,
+              to_string(summary.solve.termination), summary.solve.solve_s);
         }
 }
 

@@ -1,7 +1,5 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/direct_folder.h"
-
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -9,8 +7,7 @@
 #include <optional>
 
 #include "image/png.h"
-#include "io/output_file.h"
-#include "io/text_buffer.h"
+#include "io/direct_folder.h"
 #include "io/token_reader.h"
 
 namespace sheaf {
@@ -18,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whole, whatever its size turns out to be.
+}  // namespace
+
 Result<std::string> bytes_of(const fs::path& path) {
   Result<RawBytes> raw = RawBytes::open(path);
   if (!raw.ok()) return raw.error();
@@ -33,6 +31,8 @@ Result<std::string> bytes_of(const fs::path& path) {
     if (n.value() < kBlock) return out;
   }
 }
+
+namespace {
 
 std::optional<Error> read_reals(TokenReader& in, double* to, std::size_t count, const char* what,
                                 std::size_t record) {
@@ -60,16 +60,38 @@ Result<void> read_text(const fs::path& path,
   return parse(text.value(), path.string(), folder);
 }
 
-Result<PhotometricFolder> read_folder(const fs::path& path, const Pinhole& camera) {
+/// fx fy cx cy, unless they are given.
+Result<void> find_intrinsics(const fs::path& path, const std::optional<Pinhole>& camera,
+                             PhotometricFolder& folder) {
+  const fs::path file = path / "intrinsics.txt";
+  if (camera) {
+    folder.problem.camera = *camera;
+    return {};
+  }
+  if (!fs::exists(file))
+    return Error(ErrorCode::usage, path.string() +
+                                       ": no intrinsics.txt (fx fy cx cy) in this folder, and no "
+                                       "intrinsics given");
+  return read_text(file, parse_direct_intrinsics, folder);
+}
+
+Result<PhotometricFolder> read_folder(const fs::path& path, const std::optional<Pinhole>& camera) {
   const auto start = std::chrono::steady_clock::now();
   PhotometricFolder folder;
   folder.format = "direct";
   PhotometricProblem& problem = folder.problem;
-  problem.camera = camera;
+  if (auto k = find_intrinsics(path, camera, folder); !k.ok()) return k.error();
   if (auto poses = read_text(path / "poses.txt", parse_direct_poses, folder); !poses.ok())
     return poses.error();
   if (auto points = read_text(path / "points.txt", parse_direct_points, folder); !points.ok())
     return points.error();
+  if (fs::exists(path / "hosts.txt"))
+    if (auto hosts = read_text(path / "hosts.txt", parse_direct_hosts, folder); !hosts.ok())
+      return hosts.error();
+  if (fs::exists(path / "brightness.txt"))
+    if (auto looks = read_text(path / "brightness.txt", parse_direct_brightness, folder);
+        !looks.ok())
+      return looks.error();
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     folder.files.push_back(path / (std::to_string(i) + ".png"));
     Result<GreyImage> image = read_grey(folder.files.back());
@@ -126,76 +148,61 @@ Result<void> parse_direct_points(std::string_view text, const std::string& name,
   return {};
 }
 
-Result<PhotometricFolder> read_photometric(const fs::path& path, const Pinhole& camera) {
+Result<void> parse_direct_hosts(std::string_view text, const std::string& name,
+                                PhotometricFolder& folder) {
+  Result<ByteSource> source = ByteSource::open(RawBytes(text, name));
+  if (!source.ok()) return source.error();
+  TokenReader in(source.value());
+  PhotometricProblem& problem = folder.problem;
+  const std::size_t images = problem.poses.size();
+  for (std::size_t i = 0; i < problem.num_points(); ++i) {
+    std::uint64_t image = 0;
+    if (!in.read_integer(image) || image >= images)
+      return in.unexpected("the host image of point " + std::to_string(i) + ", 0 to " +
+                           std::to_string(images - 1));
+    std::array<double, 2> xy;
+    if (auto e = read_reals(in, xy.data(), xy.size(), "the host pixel of point", i)) return *e;
+    problem.host.push_back(static_cast<std::uint32_t>(image));
+    problem.host_xy.insert(problem.host_xy.end(), xy.begin(), xy.end());
+  }
+  if (!in.at_end()) return in.unexpected("the end of the file behind the last point's host");
+  return {};
+}
+
+Result<void> parse_direct_brightness(std::string_view text, const std::string& name,
+                                     PhotometricFolder& folder) {
+  Result<ByteSource> source = ByteSource::open(RawBytes(text, name));
+  if (!source.ok()) return source.error();
+  TokenReader in(source.value());
+  for (std::size_t i = 0; i < folder.problem.poses.size(); ++i) {
+    std::array<double, 2> ab;
+    if (auto e = read_reals(in, ab.data(), ab.size(), "the brightness a b of image", i)) return *e;
+    folder.problem.brightness.push_back({ab[0], ab[1]});
+  }
+  if (!in.at_end()) return in.unexpected("the end of the file behind the last image's brightness");
+  return {};
+}
+
+Result<void> parse_direct_intrinsics(std::string_view text, const std::string& name,
+                                     PhotometricFolder& folder) {
+  Result<ByteSource> source = ByteSource::open(RawBytes(text, name));
+  if (!source.ok()) return source.error();
+  TokenReader in(source.value());
+  std::array<double, 4> k;
+  if (auto e = read_reals(in, k.data(), k.size(), "the intrinsics fx fy cx cy of camera", 0))
+    return *e;
+  if (!in.at_end()) return in.unexpected("the end of the file behind fx fy cx cy");
+  folder.problem.camera = {k[0], k[1], k[2], k[3]};
+  return {};
+}
+
+Result<PhotometricFolder> read_photometric(const fs::path& path,
+                                           const std::optional<Pinhole>& camera) {
   try {
     return read_folder(path, camera);
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, path.string() + ": not enough memory for these images");
   }
-}
-
-namespace {
-
-template <class Put>
-Result<void> write_text(const fs::path& path, const Put& put) {
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
-  if (!out.ok()) return out.error();
-  TextBuffer text(out.value());
-  put(text);
-  text.flush();
-  return out.value().commit();
-}
-
-Result<void> copy_image(const fs::path& from, const fs::path& to) {
-  std::error_code same;
-  if (fs::equivalent(from, to, same)) return {};
-  const Result<std::string> bytes = bytes_of(from);
-  if (!bytes.ok()) return bytes.error();
-  Result<OutputFile> out = OutputFile::create(to, Compression::none);
-  if (!out.ok()) return out.error();
-  out.value().write(bytes.value());
-  return out.value().commit();
-}
-
-void put_poses(const PhotometricFolder& folder, TextBuffer& text) {
-  for (std::size_t i = 0; i < folder.problem.poses.size(); ++i) {
-    const Pose& pose = folder.problem.poses[i];
-    text.put(folder.times[i], ' ');
-    for (double t : pose.translation) text.put(t, ' ');
-    for (int k : {1, 2, 3, 0}) text.put(pose.rotation[k], k == 0 ? '\n' : ' ');
-  }
-}
-
-void put_points(const PhotometricProblem& problem, TextBuffer& text) {
-  const std::size_t pixels = problem.patch.size();
-  for (std::size_t i = 0; i < problem.num_points(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) text.put(problem.points[3 * i + k], ' ');
-    for (std::size_t k = 0; k < pixels; ++k)
-      text.put(problem.patches[pixels * i + k], k + 1 == pixels ? '\n' : ' ');
-  }
-}
-
-}  // namespace
-
-Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error)
-    return Error(ErrorCode::unwritable_output,
-                 path.string() + ": the folder cannot be made: " + error.message());
-  const PhotometricProblem& problem = folder.problem;
-  if (auto r = write_text(path / "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
-    return r;
-  if (auto r = write_text(path / "points.txt", [&](auto& t) { put_points(problem, t); }); !r.ok())
-    return r;
-  const auto put_brightness = [&](TextBuffer& text) {
-    for (const Brightness& of : problem.brightness) text.put(of.a, ' '), text.put(of.b, '\n');
-  };
-  if (auto r = write_text(path / "brightness.txt", put_brightness); !r.ok()) return r;
-  for (std::size_t i = 0; i < folder.files.size(); ++i)
-    if (auto r = copy_image(folder.files[i], path / (std::to_string(i) + ".png")); !r.ok())
-      return r;
-  return {};
 }
 
 }  // namespace sheaf

@@ -1,0 +1,125 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "image/png.h"
+#include "io/direct_folder.h"
+#include "io/output_file.h"
+#include "io/text_buffer.h"
+
+namespace sheaf {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class Put>
+Result<void> write_text(const fs::path& path, const Put& put) {
+  Result<OutputFile> out = OutputFile::create(path, Compression::none);
+  if (!out.ok()) return out.error();
+  TextBuffer text(out.value());
+  put(text);
+  text.flush();
+  return out.value().commit();
+}
+
+Result<void> copy_image(const fs::path& from, const fs::path& to) {
+  std::error_code same;
+  if (fs::equivalent(from, to, same)) return {};
+  const Result<std::string> bytes = bytes_of(from);
+  if (!bytes.ok()) return bytes.error();
+  Result<OutputFile> out = OutputFile::create(to, Compression::none);
+  if (!out.ok()) return out.error();
+  out.value().write(bytes.value());
+  return out.value().commit();
+}
+
+/// Grey levels as the nearest of 8 bits.
+Result<void> write_image(const GreyImage& image, const fs::path& to) {
+  Raster raster{image.width, image.height, 1, 8, {}};
+  for (float grey : image.pixels)
+    raster.samples.push_back(
+        static_cast<std::uint16_t>(std::clamp(std::lround(grey), long{0}, long{255})));
+  const Result<std::string> bytes = encode_png(raster);
+  if (!bytes.ok()) return bytes.error();
+  Result<OutputFile> out = OutputFile::create(to, Compression::none);
+  if (!out.ok()) return out.error();
+  out.value().write(bytes.value());
+  return out.value().commit();
+}
+
+void put_poses(const PhotometricFolder& folder, TextBuffer& text) {
+  for (std::size_t i = 0; i < folder.problem.poses.size(); ++i) {
+    const Pose& pose = folder.problem.poses[i];
+    text.put(folder.times.empty() ? static_cast<double>(i) : folder.times[i], ' ');
+    for (double t : pose.translation) text.put(t, ' ');
+    for (int k : {1, 2, 3, 0}) text.put(pose.rotation[k], k == 0 ? '\n' : ' ');
+  }
+}
+
+/// Grey levels of the course's sixteen pixels around a host's pixel.
+float host_grey(const PhotometricProblem& problem, std::size_t point, std::size_t k,
+                const Pattern& pattern) {
+  const GreyImage& image = problem.images[problem.host[point]];
+  const auto at = [&](double middle, int offset, int size) {
+    return std::size_t(std::clamp(static_cast<int>(std::lround(middle)) + offset, 0, size - 1));
+  };
+  const std::size_t x = at(problem.host_xy[2 * point], pattern.dx[k], image.width);
+  const std::size_t y = at(problem.host_xy[2 * point + 1], pattern.dy[k], image.height);
+  return image.pixels[y * std::size_t(image.width) + x];
+}
+
+void put_points(const PhotometricProblem& problem, TextBuffer& text) {
+  const Pattern pattern = make_pattern("4x4").value();
+  const std::size_t pixels = pattern.size();
+  for (std::size_t i = 0; i < problem.num_points(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) text.put(problem.points[3 * i + k], ' ');
+    for (std::size_t k = 0; k < pixels; ++k)
+      text.put(problem.patches.empty() ? host_grey(problem, i, k, pattern)
+                                       : problem.patches[pixels * i + k],
+               k + 1 == pixels ? '\n' : ' ');
+  }
+}
+
+}  // namespace
+
+Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error)
+    return Error(ErrorCode::unwritable_output,
+                 path.string() + ": the folder cannot be made: " + error.message());
+  const PhotometricProblem& problem = folder.problem;
+  if (auto r = write_text(path / "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
+    return r;
+  if (auto r = write_text(path / "points.txt", [&](auto& t) { put_points(problem, t); }); !r.ok())
+    return r;
+  const auto put_hosts = [&](TextBuffer& text) {
+    for (std::size_t i = 0; i < problem.host.size(); ++i) {
+      text.put(problem.host[i], ' ');
+      text.put(problem.host_xy[2 * i], ' '), text.put(problem.host_xy[2 * i + 1], '\n');
+    }
+  };
+  if (problem.has_hosts())
+    if (auto r = write_text(path / "hosts.txt", put_hosts); !r.ok()) return r;
+  const auto put_intrinsics = [&](TextBuffer& text) {
+    const Pinhole& k = problem.camera;
+    text.put(k.fx, ' '), text.put(k.fy, ' '), text.put(k.cx, ' '), text.put(k.cy, '\n');
+  };
+  if (auto r = write_text(path / "intrinsics.txt", put_intrinsics); !r.ok()) return r;
+  const auto put_brightness = [&](TextBuffer& text) {
+    for (const Brightness& of : problem.brightness) text.put(of.a, ' '), text.put(of.b, '\n');
+  };
+  if (!problem.brightness.empty())
+    if (auto r = write_text(path / "brightness.txt", put_brightness); !r.ok()) return r;
+  for (std::size_t i = 0; i < problem.images.size(); ++i) {
+    const fs::path to = path / (std::to_string(i) + ".png");
+    if (auto r = folder.files.empty() ? write_image(problem.images[i], to)
+                                      : copy_image(folder.files[i], to);
+        !r.ok())
+      return r;
+  }
+  return {};
+}
+
+}  // namespace sheaf
