@@ -8,7 +8,7 @@ namespace sheaf {
 namespace {
 
 Json options_json(const PhotometricArguments& a) {
-  return {{"intrinsics", a.intrinsics},
+  return {{"intrinsics", a.intrinsics.empty() ? Json() : Json(a.intrinsics)},
           {"interpolation", a.interpolation},
           {"brightness", a.brightness},
           {"loss", a.loss},

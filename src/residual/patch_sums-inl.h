@@ -59,6 +59,20 @@ HWY_INLINE V load_greys(const float* p) {
   return hn::PromoteTo(D(), hn::LoadU(d, p));
 }
 
+/// Of a narrow grid's eight lanes the upper four stand `jump` floats further than the lower. A part
+/// of four lanes or fewer begins where it stands.
+template <bool kNarrow>
+HWY_INLINE V load_row(const float* p, [[maybe_unused]] std::ptrdiff_t jump) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (kNarrow && kLanes == 8) {
+    const hn::Rebind<float, D> d;
+    const hn::Half<hn::Rebind<float, D>> half;
+    return hn::PromoteTo(D(), hn::Combine(d, hn::LoadU(half, p + jump), hn::LoadU(half, p)));
+  }
+#endif
+  return load_greys(p);
+}
+
 HWY_INLINE void store_zeros(double* to) {
   for (int p = 0; p < kParts; ++p) store(zero(), to + p * kLanes);
 }
@@ -91,8 +105,10 @@ struct LaneTaps {
 /// A row of the image under the patch, interpolated along x: value and slope.
 struct RowTaps {
   V value, slope;
-  HWY_INLINE void read(const float* p, const LaneTaps& x) {
-    const V a = load_greys(p), b = load_greys(p + 1), c = load_greys(p + 2), d = load_greys(p + 3);
+  template <bool kNarrow>
+  HWY_INLINE void read(const float* p, std::ptrdiff_t jump, const LaneTaps& x) {
+    const V a = load_row<kNarrow>(p, jump), b = load_row<kNarrow>(p + 1, jump);
+    const V c = load_row<kNarrow>(p + 2, jump), d = load_row<kNarrow>(p + 3, jump);
     value = fma(x.value[0], a, fma(x.value[1], b, fma(x.value[2], c, hn::Mul(x.value[3], d))));
     slope = fma(x.slope[0], a, fma(x.slope[1], b, fma(x.slope[2], c, hn::Mul(x.slope[3], d))));
   }
@@ -143,21 +159,21 @@ HWY_INLINE void add_pixels(const LanePixels& at, V alpha, V beta, const LossLane
 /// Where the rows of a strip's part lie: they all have the same fraction of a pixel.
 struct Strip {
   const float* corner;  ///< one pixel left of and above the first
-  std::ptrdiff_t stride;
+  std::ptrdiff_t stride, jump;
   const float *reference, *mask;
-  int rows;
+  int steps;
 };
 
 /// Eight columns of a part, from a strip's top row down.
-template <bool kBrightness>
+template <bool kBrightness, bool kNarrow>
 HWY_INLINE void sum_strip(const Strip& strip, const LaneTaps& x, const LaneTaps& y, V alpha, V beta,
                           const LossLanes& loss, bool weigh, V* sums) {
   RowTaps r0, r1, r2, r3;
-  r0.read(strip.corner, x);
-  r1.read(strip.corner + strip.stride, x);
-  r2.read(strip.corner + 2 * strip.stride, x);
-  for (int row = 0; row < strip.rows; ++row) {
-    r3.read(strip.corner + (row + 3) * strip.stride, x);
+  r0.read<kNarrow>(strip.corner, strip.jump, x);
+  r1.read<kNarrow>(strip.corner + strip.stride, strip.jump, x);
+  r2.read<kNarrow>(strip.corner + 2 * strip.stride, strip.jump, x);
+  for (int row = 0; row < strip.steps; ++row) {
+    r3.read<kNarrow>(strip.corner + (row + 3) * strip.stride, strip.jump, x);
     const LanePixels at{load_greys(strip.mask + 8 * row), load_greys(strip.reference + 8 * row),
                         across(y.value, r0.value, r1.value, r2.value, r3.value),
                         across(y.value, r0.slope, r1.slope, r2.slope, r3.slope),
@@ -225,28 +241,24 @@ template <bool kBrightness>
 HWY_INLINE void sum_warped(const PhotometricInput& in, const PatchAt& patch, const LossLanes& loss,
                            bool weigh, double* to) {
   const PatchGrid& grid = *in.grid;
-  alignas(64) static constexpr double kColumns[8] = {0, 1, 2, 3, 4, 5, 6, 7};
   const V alpha = set(patch.alpha), beta = set(patch.beta);
   for (int p = 0; p < kParts; ++p) {
     V sums[kPatchSums<kBrightness>];
     for (V& s : sums) s = zero();
-    for (int strip = 0; strip < grid.strips; ++strip) {
-      const V dx = hn::Add(load(kColumns + p * kLanes), set(grid.left + 8.0 * strip));
-      for (int row = 0; row < grid.rows; ++row) {
-        const V dy = set(static_cast<double>(grid.top + row));
-        V P[3];
-        for (int i = 0; i < 3; ++i)
-          P[i] = fma(dx, set(patch.along[i]), fma(dy, set(patch.down[i]), set(patch.P[i])));
-        const V iz = hn::Div(set(1.0), P[2]);
-        const int cells = 8 * grid.rows * strip + 8 * row + p * kLanes;
-        LanePixels at;
-        at.mask = load_greys(grid.mask.data() + cells);
-        at.reference = load_greys(patch.reference + cells);
-        read_spread(*patch.plane, in.taps,
-                    fma(set(in.camera.fx), hn::Mul(P[0], iz), set(in.camera.cx)),
-                    fma(set(in.camera.fy), hn::Mul(P[1], iz), set(in.camera.cy)), at);
-        add_pixels<kBrightness>(at, alpha, beta, loss, weigh, sums);
-      }
+    for (int step = 0; step < grid.strips * grid.steps; ++step) {
+      const int cells = 8 * step + p * kLanes;
+      const V dx = load_greys(grid.dx.data() + cells), dy = load_greys(grid.dy.data() + cells);
+      V P[3];
+      for (int i = 0; i < 3; ++i)
+        P[i] = fma(dx, set(patch.along[i]), fma(dy, set(patch.down[i]), set(patch.P[i])));
+      const V iz = hn::Div(set(1.0), P[2]);
+      LanePixels at;
+      at.mask = load_greys(grid.mask.data() + cells);
+      at.reference = load_greys(patch.reference + cells);
+      read_spread(*patch.plane, in.taps,
+                  fma(set(in.camera.fx), hn::Mul(P[0], iz), set(in.camera.cx)),
+                  fma(set(in.camera.fy), hn::Mul(P[1], iz), set(in.camera.cy)), at);
+      add_pixels<kBrightness>(at, alpha, beta, loss, weigh, sums);
     }
     for (int k = 0; k < kPatchSums<kBrightness>; ++k)
       store(sums[k], to + kSumStride * k + p * kLanes);
@@ -268,11 +280,16 @@ HWY_INLINE void sum_patch(const PhotometricInput& in, const PatchAt& at, double*
   for (int p = 0; p < kParts; ++p) {
     V sums[kPatchSums<kBrightness>];
     for (V& s : sums) s = zero();
+    const std::ptrdiff_t stride = at.plane->stride(), jump = grid.steps * stride;
     for (int k = 0; k < grid.strips; ++k) {
-      const int cells = 8 * grid.rows * k + p * kLanes;
-      const Strip strip{corner + 8 * k + p * kLanes, at.plane->stride(), at.reference + cells,
-                        grid.mask.data() + cells, grid.rows};
-      sum_strip<kBrightness>(strip, x, y, alpha, beta, loss, weigh, sums);
+      const int lane = p * kLanes, cells = 8 * grid.steps * k + lane;
+      const float* first = corner + (grid.narrow ? lane % 4 + lane / 4 * jump : 8 * k + lane);
+      const Strip strip{first,     stride, jump, at.reference + cells, grid.mask.data() + cells,
+                        grid.steps};
+      if (grid.narrow)
+        sum_strip<kBrightness, true>(strip, x, y, alpha, beta, loss, weigh, sums);
+      else
+        sum_strip<kBrightness, false>(strip, x, y, alpha, beta, loss, weigh, sums);
     }
     for (int k = 0; k < kPatchSums<kBrightness>; ++k)
       store(sums[k], to + kSumStride * k + p * kLanes);

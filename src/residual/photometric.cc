@@ -80,9 +80,7 @@ bool patch_residuals(const PatchScene& scene, const PatchState& state, const Sig
   out.resize(grid.place.size());
   for (std::size_t k = 0; k < out.size(); ++k) {
     const std::uint32_t cell = grid.place[k];
-    const int strip = static_cast<int>(cell) / (8 * grid.rows);
-    const int dx = grid.left + 8 * strip + static_cast<int>(cell % 8);
-    const int dy = grid.top + static_cast<int>(cell) / 8 % grid.rows;
+    const int dx = static_cast<int>(grid.dx[cell]), dy = static_cast<int>(grid.dy[cell]);
     const PatchPlace at = scene.warped ? place_patch(scene, state, sight, dx, dy)
                                        : PatchPlace{middle.x + dx, middle.y + dy, middle.depth};
     out[k] = sample(plane, scene.taps, at.x, at.y).value - (look.a * g[cell] + look.b);
@@ -96,14 +94,24 @@ PatchGrid make_grid(const Pattern& pattern) {
   const auto [top, bottom] = std::minmax_element(pattern.dy.begin(), pattern.dy.end());
   grid.left = *left, grid.top = *top;
   grid.width = *right - *left + 1, grid.rows = *bottom - *top + 1;
+  grid.narrow = grid.width <= 4;
   grid.strips = (grid.width + 7) / 8;
-  grid.mask.assign(std::size_t(8 * grid.rows * grid.strips), 0);
-  for (std::size_t k = 0; k < pattern.size(); ++k) {
-    const int column = pattern.dx[k] - grid.left, row = pattern.dy[k] - grid.top;
-    const int cell = 8 * grid.rows * (column / 8) + 8 * row + column % 8;
-    grid.mask[static_cast<std::size_t>(cell)] = 1;
-    grid.place.push_back(static_cast<std::uint32_t>(cell));
-  }
+  grid.steps = grid.narrow ? (grid.rows + 1) / 2 : grid.rows;
+  for (int strip = 0; strip < grid.strips; ++strip)
+    for (int step = 0; step < grid.steps; ++step)
+      for (int lane = 0; lane < 8; ++lane) {
+        const int column = grid.narrow ? lane % 4 : 8 * strip + lane;
+        const int row = grid.narrow ? step + grid.steps * (lane / 4) : step;
+        grid.dx.push_back(static_cast<float>(grid.left + column));
+        grid.dy.push_back(static_cast<float>(grid.top + row));
+      }
+  grid.mask.assign(grid.dx.size(), 0);
+  for (std::size_t k = 0; k < pattern.size(); ++k)
+    for (std::uint32_t cell = 0; cell < grid.cells(); ++cell)
+      if (grid.dx[cell] == pattern.dx[k] && grid.dy[cell] == pattern.dy[k]) {
+        grid.mask[cell] = 1;
+        grid.place.push_back(cell);
+      }
   return grid;
 }
 

@@ -15,12 +15,16 @@
 
 namespace sheaf {
 
-/// A pattern on a grid that the kernels walk: strips of eight columns, each from the top row down.
+/// A pattern on a grid that the kernels walk with eight lanes. Wide patterns: a strip is eight
+/// columns, lane by lane, and a step is a row. Patterns of up to four columns: the lower four lanes
+/// walk the upper half of the rows and the upper four the lower half.
 struct PatchGrid {
-  int left = 0, top = 0;    ///< least dx and dy
-  int width = 0, rows = 0;  ///< extent
-  int strips = 0;           ///< of eight columns
-  std::vector<float> mask;  ///< 1 where the pattern has a pixel, else 0; strip, row, column
+  int left = 0, top = 0;             ///< least dx and dy
+  int width = 0, rows = 0;           ///< extent
+  bool narrow = false;               ///< two half patches side by side
+  int strips = 0, steps = 0;         ///< strips of so many steps
+  std::vector<float> mask;           ///< 1 where the pattern has a pixel, else 0; strip, step, lane
+  std::vector<float> dx, dy;         ///< of every cell of `mask`
   std::vector<std::uint32_t> place;  ///< of the pattern's pixel k in `mask`
 
   std::size_t cells() const { return mask.size(); }

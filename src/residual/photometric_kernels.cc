@@ -131,24 +131,14 @@ struct CollapseSums {
   std::uint64_t left = 0;
 };
 
-/// The patches of one batch's part.
+/// The sums of a part's patches, into scratch; 1 in `inside` for those that fit, and no place in
+/// `seen` for the others. Returns how many of these there are.
 template <bool kBrightness, bool kRays>
-HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& group,
-                              std::size_t g, std::uint64_t b, int part, double* scratch,
-                              const PhotometricOutput& out, CollapseSums& sums) {
-  const Batches& batches = *in.batches;
-  const int lane = part * kLanes;
-  const std::uint32_t* block = &batches.image[8 * b + lane];
-  V c[16], d[3];
-  load_cameras<2>(in.views, block, batches.uniform[b], c);
-  const double* X = in.points + 24 * g + lane;
-  const double* from = kRays ? in.rays + 24 * g + lane : X;
-  for (int i = 0; i < 3; ++i) d[i] = load(from + 8 * i);
-  const V s = kRays ? load(X) : set(1.0);
-  const Place at = place_points(in.camera, c, d, s);
-  double* seen = out.seen + 16 * b + lane;
-  store(at.x, seen), store(at.y, seen + 8);
-  alignas(64) double P[3][8], alpha[8], beta[8], inside[8];
+HWY_INLINE std::uint64_t sum_lanes(const PhotometricInput& in, const Batches::Group& group,
+                                   std::size_t g, int lane, const std::uint32_t* block, const V* c,
+                                   const Place& at, double* seen, double* inside, double* scratch) {
+  std::uint64_t left = 0;
+  alignas(64) double P[3][8], alpha[8], beta[8];
   for (int i = 0; i < 3; ++i) store(at.P[i], P[i]);
   store(c[12], alpha), store(c[13], beta);
   for (int l = 0; l < kLanes; ++l) {
@@ -170,15 +160,38 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& 
     }
     inside[l] = fits ? 1 : 0;
     if (fits) {
-      const std::size_t point = batches.lane_point[8 * g + static_cast<std::size_t>(lane + l)];
+      const std::size_t point = in.batches->lane_point[8 * g + static_cast<std::size_t>(lane + l)];
       patch.reference = in.references + in.grid->cells() * point;
       sum_patch<kBrightness>(in, patch, to);
     } else {
       for (int k = 0; k < kPatchSums<kBrightness>; ++k) store_zeros(to + kSumStride * k);
       seen[l] = seen[8 + l] = std::numeric_limits<double>::quiet_NaN();
-      sums.left += used;
+      left += used;
     }
   }
+  return left;
+}
+
+/// The patches of one batch's part.
+template <bool kBrightness, bool kRays>
+HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& group,
+                              std::size_t g, std::uint64_t b, int part, double* scratch,
+                              const PhotometricOutput& out, CollapseSums& sums) {
+  const Batches& batches = *in.batches;
+  const int lane = part * kLanes;
+  const std::uint32_t* block = &batches.image[8 * b + lane];
+  V c[16], d[3];
+  load_cameras<2>(in.views, block, batches.uniform[b], c);
+  const double* X = in.points + 24 * g + lane;
+  const double* from = kRays ? in.rays + 24 * g + lane : X;
+  for (int i = 0; i < 3; ++i) d[i] = load(from + 8 * i);
+  const V s = kRays ? load(X) : set(1.0);
+  const Place at = place_points(in.camera, c, d, s);
+  double* seen = out.seen + 16 * b + lane;
+  store(at.x, seen), store(at.y, seen + 8);
+  alignas(64) double inside[8];
+  sums.left +=
+      sum_lanes<kBrightness, kRays>(in, group, g, lane, block, c, at, seen, inside, scratch);
   V of[kPatchSums<kBrightness>];
   for (int k = 0; k < kPatchSums<kBrightness>; ++k) of[k] = add_lanes(scratch + kSumStride * k);
   V cost = of[kCost];

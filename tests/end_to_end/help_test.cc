@@ -22,7 +22,14 @@ std::set<std::string> options_of(const std::string& verb) {
   std::set<std::string> options = kCommon;
   if (verb == "generate" || verb == "demo") options.insert(kScene.begin(), kScene.end());
   if (verb == "generate")
-    options.insert({"--truth", "--like", "--family", "--outliers", "--drift"});
+    options.insert({"--truth", "--like", "--family", "--outliers", "--drift", "--photometric",
+                    "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
+                    "--occluder", "--start"});
+  if (verb == "photometric")
+    options.insert({"--output", "--intrinsics", "--interpolation", "--brightness", "--loss",
+                    "--loss-on", "--leaving", "--fix", "--points", "--warp", "--pattern",
+                    "--levels", "--rounds", "--min-zncc", "--max-iterations", "--tolerance",
+                    "--motion", "--time-limit", "--initial-damping"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
@@ -72,6 +79,10 @@ TEST_P(Help, ExampleRuns) {
   TemporaryFolder folder;
   ASSERT_EQ(run_command({"generate", "problem.txt", "--points", "300"}, folder.path()).exit_code,
             0);
+  if (std::string(GetParam()) == "photometric")
+    ASSERT_EQ(run_command({"generate", "scene", "--photometric", "--points", "200"}, folder.path())
+                  .exit_code,
+              0);
   std::vector<std::string> words =
       example_in(run_command({GetParam(), "--help"}, folder.path()).out);
   ASSERT_GE(words.size(), 2u);
@@ -85,15 +96,15 @@ TEST_P(Help, ExampleRuns) {
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "convert", "perturb", "evaluate",
-                                         "generate", "demo"),
+                                         "photometric", "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb :
-       {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"})
+  for (const char* verb : {"solve", "info", "convert", "perturb", "evaluate", "compare",
+                           "photometric", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

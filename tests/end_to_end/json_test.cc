@@ -116,6 +116,15 @@ TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
 
 TEST_F(JsonTest, GenerateHasTheDocumentedKeys) { expect_documented("generate", {"generate"}); }
 
+TEST_F(JsonTest, PhotometricHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"generate", "scene", "--photometric", "--points", "200", "--json", "scene.json"})
+                .exit_code,
+            0);
+  expect_documented("scene", {"generate --photometric"});
+  ASSERT_EQ(run({"photometric", "scene", "--json", "photometric.json"}).exit_code, 0);
+  expect_documented("photometric", {"photometric"});
+}
+
 TEST_F(JsonTest, PerturbHasTheDocumentedKeys) {
   ASSERT_EQ(
       run({"perturb", "in.txt", "o.txt", "--json", "perturb.json", "--outliers", "0.1"}).exit_code,

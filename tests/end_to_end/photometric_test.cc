@@ -1,0 +1,88 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "end_to_end/command.h"
+
+namespace sheaf {
+namespace {
+
+class PhotometricCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome made = run({"generate", "scene", "--photometric", "--points", "300", "--start",
+                              "1.5", "--brightness", "0.1", "--truth", "truth"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  Outcome run(const std::vector<std::string>& arguments) {
+    return run_command(arguments, folder_.path());
+  }
+  std::string in_scene(const std::string& name) { return folder_ / ("scene/" + name); }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(PhotometricCommand, RefinesAndWritesWhatItCanReadAgain) {
+  const Outcome first = run({"photometric", "scene", "-o", "refined", "--json", "1.json"});
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const auto before = json_of(folder_ / "1.json");
+  EXPECT_LT(before["rms_grey"]["after"], 0.2 * double(before["rms_grey"]["before"]));
+  EXPECT_EQ(before["brightness"].size(), 6u);
+  ASSERT_EQ(run({"photometric", "refined", "--json", "2.json"}).exit_code, 0);
+  const auto again = json_of(folder_ / "2.json");
+  EXPECT_NEAR(again["rms_grey"]["before"], before["rms_grey"]["after"], 0.02);
+  EXPECT_EQ(contents_of(folder_ / "refined/3.png"), contents_of(in_scene("3.png")));
+}
+
+TEST_F(PhotometricCommand, OptionsWork) {
+  ASSERT_EQ(run({"photometric", "scene", "--points", "xyz", "--interpolation", "bilinear",
+                 "--brightness", "none", "--loss", "cauchy:8", "--loss-on", "patch", "--leaving",
+                 "free", "--max-iterations", "4", "--initial-damping", "0.01", "--quiet"})
+                .exit_code,
+            0);
+  ASSERT_EQ(run({"photometric", "scene", "--levels",     "2",
+                 "--pattern",   "8",     "--warp",       "translation",
+                 "--min-zncc",  "0.5",   "--rounds",     "1",
+                 "--fix",       "poses", "--intrinsics", "288,288,159.5,119.5",
+                 "--tolerance", "1e-4",  "--motion",     "0.1"})
+                .exit_code,
+            0);
+  EXPECT_EQ(run({"photometric", "scene", "--time-limit", "1e-9"}).exit_code, 130);
+}
+
+TEST_F(PhotometricCommand, SaysWhatIsWrong) {
+  const auto refused = [&](int code, const std::vector<std::string>& arguments,
+                           const std::string& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
+  };
+  refused(3, {"photometric", "nowhere", "--intrinsics", "1,1,0,0"}, "nowhere/poses.txt");
+  refused(2, {"photometric", "scene", "--intrinsics", "1,1,0"}, "fx,fy,cx,cy");
+  refused(2, {"photometric", "scene", "--points", "xyz", "--levels", "2"}, "pyramid");
+  refused(2, {"photometric", "scene", "--pattern", "2x2"}, "4x4");
+  std::filesystem::remove(in_scene("intrinsics.txt"));
+  refused(2, {"photometric", "scene"}, "intrinsics");
+  const std::vector<std::string> good = {"photometric", "scene", "--intrinsics", "288,288,159,119"};
+  write_text(in_scene("hosts.txt"), "0 1 1\n6 1 1\n");
+  refused(3, good, "hosts.txt:2: found '6', expected the host image of point 1, 0 to 5");
+  std::filesystem::remove(in_scene("hosts.txt"));
+  write_text(in_scene("brightness.txt"), "1 0\n");
+  refused(3, good, "brightness.txt");
+  std::filesystem::remove(in_scene("brightness.txt"));
+  write_text(in_scene("points.txt"), "1 2 3\n4");
+  refused(3, good, "points.txt");
+  std::filesystem::remove(in_scene("2.png"));
+  write_text(in_scene("2.png"), "no image");
+  write_text(in_scene("points.txt"), contents_of(folder_ / "truth/points.txt"));
+  refused(3, good, "2.png");
+  write_text(in_scene("poses.txt"), "0 0 0 0 0 0 0 2\n");
+  refused(3, good, "unit quaternion");
+}
+
+}  // namespace
+}  // namespace sheaf
