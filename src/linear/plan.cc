@@ -7,6 +7,7 @@
 
 #include "linear/block_rows.h"
 #include "linear/coarse_space.h"
+#include "linear/forecast.h"
 #include "linear/kernels.h"
 #include "linear/sparse_cholesky.h"
 
@@ -37,15 +38,13 @@ void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
   const auto n = static_cast<double>(c.columns);
   c.sparse_flops = n * n * n / 3;
   c.sparse_doubles = c.columns * (c.columns + 8);
-  c.sparse_bytes = 8 * c.sparse_doubles;
   if (tiles.size() == c.tiles) {
     const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
     c.sparse_flops = symbolic.flops;
     c.sparse_doubles = symbolic.panel_doubles;
-    c.sparse_bytes = SparseCholesky::bytes(symbolic);
+    c.sparse_bytes = SparseCholesky::bytes(symbolic) - 8 * symbolic.panel_doubles;
   }
-  // The way of each tile into the factor, listed and sorted; several where lenses are shared.
-  c.sparse_bytes += (columns.lens_shared ? 4 : 1) * (24 + 28) * (c.tiles + c.images);
+  c.lens_shared = columns.lens_shared;
 }
 
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
@@ -138,6 +137,7 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
   c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles)
                                                  : std::min(all, c.pairs);
   count_sparse(columns, tiles, c);
+  c.pair_runs = estimate_pair_runs(batches, c);
   const Clusters clusters = coarse_clusters(batches, columns);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
   c.cluster_pairs = count_cluster_pairs(number_cluster_pairs(batches, clusters));
@@ -187,34 +187,5 @@ bool has_mixed(SolverKind kind) {
 }
 
 bool prefers_mixed(SolverKind kind) { return has_mixed(kind); }
-
-std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads) {
-  const SolverKind kind = plan.kind;
-  const bool pairs = kind != SolverKind::blocks && kind != SolverKind::implicit_cg;
-  const std::uint64_t tiles = pairs ? c.tiles : 0;
-  const auto slices = static_cast<std::uint64_t>(
-      count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
-  std::uint64_t sum = c.batches * (32 + 4 + 128) + c.groups * (16 + 32);
-  if (c.weighted) sum += c.batches * 64;
-  sum += c.groups * 8 * (2 * kPointGroup + kFactorGroup);
-  sum += c.images * (8 * 2 * kCameraRecord + 2 * 56 + 2 * 24 + 36 + 4) + 5 * 8 * c.columns;
-  sum += slices * 8 * (kTileDoubles * tiles + kDiagonalDoubles * c.images);
-  sum += static_cast<std::uint64_t>(threads) * 8 * 8 *
-         (48 * std::max<std::uint64_t>(Chunks::kBatchesPerChunk, c.longest_track) +
-          57 * std::uint64_t(c.longest_track));
-  if (pairs) sum += 4 * c.pairs + 8 * tiles + 6 * c.observations;
-  if (kind == SolverKind::dense) sum += 8 * c.columns * (c.columns + 8);
-  if (kind == SolverKind::sparse) sum += c.sparse_bytes;
-  if (kind == SolverKind::explicit_cg)
-    sum += (2 * tiles + c.images) * (8 * kBlockEntry + 20) + 256 * c.images;
-  if (kind == SolverKind::implicit_cg)
-    sum += slices * 8 * kProductRecord * c.images +
-           (plan.mixed ? slices * 8 * kProductRecord + 4 * kFloatCameraRecord : 0) * c.images;
-  if (kind != SolverKind::dense && kind != SolverKind::sparse)
-    sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
-  if ((kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg) && c.clusters > 0)
-    sum += CoarseSpace::bytes(c.images, c.clusters, c.cluster_pairs, slices);
-  return sum;
-}
 
 }  // namespace sheaf

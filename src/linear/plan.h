@@ -23,10 +23,13 @@ struct WorkCounts {
   std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
   double sparse_flops = 0;
-  std::uint64_t sparse_doubles = 0, sparse_bytes = 0;
+  std::uint64_t sparse_doubles = 0;
+  std::uint64_t sparse_bytes = 0;  ///< beside these
   /// Of the coarse space of the iterative solvers; 0: none.
   std::uint64_t clusters = 0, cluster_pairs = 0;
   std::uint32_t longest_track = 0;
+  std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
+  bool lens_shared = false;
   bool images_couple = true;  ///< some free point or shared lens couples images
   bool weighted = false;      ///< a loss leaves a weight for each observation
 
@@ -52,9 +55,6 @@ Plan plan_solver(const WorkCounts& counts);
 
 /// The cheaper of the two iterative ones.
 SolverKind cheaper_iterative(const WorkCounts& counts);
-
-/// Bytes that the system will hold with this solver, what the batches hold included.
-std::uint64_t forecast_bytes(const WorkCounts& counts, const Plan& plan, int threads);
 
 /// Flops to linearise so many batches and to multiply so many pairs.
 double linearize_flops(std::uint64_t batches, std::uint64_t pairs);

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "solve/choose_solver.h"
 
+#include <algorithm>
 #include <string>
 
 #include "linear/chunks.h"
+#include "linear/forecast.h"
 
 namespace sheaf {
 namespace {
@@ -48,7 +50,7 @@ std::string megabytes(std::uint64_t bytes) {
 }  // namespace
 
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
-                             std::uint64_t resident_bytes) {
+                             const MemoryHeld& held) {
   Choice choice{asked_for(counts, options.solver), 0};
   const bool forms_pairs =
       choice.plan.kind != SolverKind::blocks && choice.plan.kind != SolverKind::implicit_cg;
@@ -58,7 +60,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
                                        std::to_string(Chunks::kLongestTrack) +
                                        ": use the implicit iterative solver");
   const auto forecast = [&](const Plan& plan) {
-    return resident_bytes + forecast_bytes(counts, plan, threads);
+    return std::max(held.peak_bytes, held.resident_bytes + forecast_bytes(counts, plan, threads));
   };
   choice.plan.mixed = takes_mixed(choice.plan.kind, options.precision);
   choice.forecast_bytes = forecast(choice.plan);

@@ -85,11 +85,11 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   }
   Threads threads(options.threads);
   Columns columns = number_columns(problem, options.fixed);
-  const std::uint64_t resident = resident_bytes();
   Batches batches = arrange(problem, skip);
   WorkCounts counts = count_work(batches, columns, options.fixed.points);
   counts.weighted = options.loss.kind != LossKind::none;
-  Result<Choice> choice = choose_solver(counts, options, threads.count(), resident);
+  Result<Choice> choice = choose_solver(counts, options, threads.count(),
+                                        {resident_bytes(), peak_resident_bytes()});
   if (!choice.ok()) return choice.error();
   summary.solver = to_string(choice.value().plan.kind);
   summary.solver_reason = choice.value().plan.reason;
