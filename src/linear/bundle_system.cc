@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "linear/slices.h"
@@ -11,6 +12,8 @@
 namespace sheaf {
 
 namespace {
+
+constexpr std::size_t kGroupsPerTask = 1024;
 
 /// Points that are held couple no images: no pairs. Lists number records with 16 bits, too few for
 /// the longest tracks: sums then run over the records in their own order.
@@ -40,7 +43,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       threads_(threads),
       batches_(std::move(batches)),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              lists_for(plan.kind, rules.held, batches_.longest_track))),
+                              lists_for(plan.kind, rules.held, batches_.longest_track), threads)),
       columns_(std::move(columns)) {
   fill_state(problem);
   const std::size_t slices = chunks_.slices.size() - 1;
@@ -51,7 +54,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
   const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   camera_step_.allocate(padded);
-  make_coarse_space(plan.kind);
+  make_coarse_space(plan);
   switch (plan.kind) {
     case SolverKind::blocks:
       solver_ = make_block_solver(columns_, threads);
@@ -73,11 +76,11 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
   }
 }
 
-void BundleSystem::make_coarse_space(SolverKind kind) {
-  if (rules_.held || (kind != SolverKind::explicit_cg && kind != SolverKind::implicit_cg)) return;
-  Clusters clusters = coarse_clusters(batches_, columns_);
-  if (clusters.count > 0)
-    coarse_ = std::make_unique<CoarseSpace>(batches_, columns_, std::move(clusters),
+void BundleSystem::make_coarse_space(const Plan& plan) {
+  const bool iterates =
+      plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
+  if (!rules_.held && iterates && plan.clusters.count > 0)
+    coarse_ = std::make_unique<CoarseSpace>(batches_, columns_, plan.clusters,
                                             chunks_.slices.size() - 1, kernels_, threads_);
 }
 
@@ -95,11 +98,13 @@ void BundleSystem::fill_state(const Problem& problem) {
     write_camera_record(i, poses_[i], lenses_[image_camera_[i]].data(), cameras_.data());
   points_.allocate(kPointGroup * batches_.groups.size());
   trial_points_.allocate(points_.size());
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (int l = 0; l < 8; ++l) {
-      const double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
-      for (int d = 0; d < 3; ++d) points_[kPointGroup * g + 8 * d + l] = X[d];
-    }
+  threads_.for_ranges(batches_.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (int l = 0; l < 8; ++l) {
+        const double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+        for (int d = 0; d < 3; ++d) points_[kPointGroup * g + 8 * d + l] = X[d];
+      }
+  });
 }
 
 void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<double>& pose,
@@ -271,11 +276,13 @@ void BundleSystem::store(Problem& problem) const {
     problem.poses[i].translation = poses_[i].translation;
   }
   for (std::size_t i = 0; i < lenses_.size(); ++i) problem.cameras[i].parameters = lenses_[i];
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {
-      double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
-      for (int d = 0; d < 3; ++d) X[d] = points_[kPointGroup * g + 8 * d + l];
-    }
+  threads_.for_ranges(batches_.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {
+        double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+        for (int d = 0; d < 3; ++d) X[d] = points_[kPointGroup * g + 8 * d + l];
+      }
+  });
 }
 
 double BundleSystem::residual_scale(double quantile) {
@@ -307,10 +314,14 @@ DigitCounts BundleSystem::count_residuals(const QuantileSearch& search) {
 }
 
 std::uint64_t BundleSystem::count_behind() {
-  std::uint64_t count = 0;
-  for (const Chunk& chunk : chunks_.chunks)
-    count += kernels_.count_behind(batches_, cameras_.data(), points_.data(), chunk);
-  return count;
+  const std::size_t slices = chunks_.slices.size() - 1;
+  std::vector<std::uint64_t> counts(slices, 0);
+  threads_.for_each(slices, [&](std::size_t s) {
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      counts[s] +=
+          kernels_.count_behind(batches_, cameras_.data(), points_.data(), chunks_.chunks[c]);
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
 }
 
 std::uint64_t BundleSystem::bytes() const {

@@ -51,7 +51,7 @@ class BundleSystem : public System {
   void fill_state(const Problem& problem);
   void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                            const double* parameters, double* records);
-  void make_coarse_space(SolverKind kind);
+  void make_coarse_space(const Plan& plan);
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();

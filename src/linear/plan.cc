@@ -3,6 +3,8 @@
 #include "linear/plan.h"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <vector>
 
 #include "linear/block_rows.h"
@@ -14,23 +16,41 @@
 namespace sheaf {
 namespace {
 
-/// Distinct image pairs that share a point, by marking a triangular bitmap; listed as far as there
-/// is room for them in a list of kAnalysedTiles.
-std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list) {
-  std::vector<std::uint64_t> marked((images * (images + 1) / 2 + 63) / 64, 0);
-  std::uint64_t tiles = 0;
-  for_each_image_set(batches, [&](const std::vector<std::uint32_t>& set) {
-    for (std::size_t i = 0; i < set.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j) {
-        const std::uint64_t at = std::uint64_t(set[i]) * (set[i] + 1) / 2 + set[j];
-        std::uint64_t& word = marked[at / 64];
-        const std::uint64_t bit = std::uint64_t(1) << (at % 64);
-        if ((word & bit) != 0) continue;
-        word |= bit;
-        if (++tiles <= WorkCounts::kAnalysedTiles)
-          list.push_back({std::max(set[i], set[j]), std::min(set[i], set[j])});
-      }
+/// Distinct image pairs that share a point, by marking a triangular bitmap; listed if they are at
+/// most kAnalysedTiles.
+std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list,
+                          Threads& threads) {
+  constexpr std::size_t kGroups = 256, kWords = 65536;
+  const auto row_start = [](std::uint64_t row) { return row * (row + 1) / 2; };
+  std::vector<std::uint64_t> marked((row_start(images) + 63) / 64, 0);
+  threads.for_ranges(batches.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
+    for_each_image_set(batches, g, end, [&](const std::vector<std::uint32_t>& set) {
+      for (std::size_t i = 0; i < set.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j) {
+          const std::uint64_t at = row_start(set[i]) + set[j];
+          const std::uint64_t bit = std::uint64_t(1) << (at % 64);
+          // Most are marked already: reading first keeps the line shared among threads.
+          std::atomic_ref<std::uint64_t> word(marked[at / 64]);
+          if ((word.load(std::memory_order_relaxed) & bit) == 0)
+            word.fetch_or(bit, std::memory_order_relaxed);
+        }
+    });
   });
+  std::atomic<std::uint64_t> tiles{0};
+  threads.for_ranges(marked.size(), kWords, [&](std::size_t w, std::size_t end) {
+    std::uint64_t here = 0;
+    for (; w < end; ++w) here += static_cast<std::uint64_t>(std::popcount(marked[w]));
+    tiles += here;
+  });
+  if (tiles > WorkCounts::kAnalysedTiles) return tiles;
+  list.reserve(tiles);
+  for (std::uint64_t w = 0, row = 0; w < marked.size(); ++w)
+    for (std::uint64_t word = marked[w]; word != 0; word &= word - 1) {
+      const std::uint64_t at = 64 * w + static_cast<std::uint64_t>(std::countr_zero(word));
+      while (at >= row_start(row + 1)) ++row;
+      list.push_back(
+          {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(at - row_start(row))});
+    }
   return tiles;
 }
 
@@ -120,7 +140,8 @@ const char* to_string(SolverKind kind) {
   return "dense";
 }
 
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held) {
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
+                      Clusters& clusters, Threads& threads) {
   WorkCounts c;
   c.images = columns.num_images();
   c.columns = static_cast<std::uint64_t>(columns.count);
@@ -134,13 +155,13 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
     c.pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
   const std::uint64_t all = c.images * (c.images + 1) / 2;
   std::vector<Tile> tiles;
-  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles)
+  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles, threads)
                                                  : std::min(all, c.pairs);
   count_sparse(columns, tiles, c);
   c.pair_runs = estimate_pair_runs(batches, c);
-  const Clusters clusters = coarse_clusters(batches, columns);
+  clusters = coarse_clusters(batches, columns, threads);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
-  c.cluster_pairs = count_cluster_pairs(number_cluster_pairs(batches, clusters));
+  c.cluster_pairs = count_cluster_pairs(clusters.pairs);
   return c;
 }
 

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <string>
 
+#include "linear/clusters.h"
 #include "linear/columns.h"
+#include "platform/parallel.h"
 #include "residual/batches.h"
 
 namespace sheaf {
@@ -36,13 +38,16 @@ struct WorkCounts {
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
 };
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held);
+/// Also finds the clusters of the coarse space.
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
+                      Clusters& clusters, Threads& threads);
 
 /// A solver and, in one line, why it was taken.
 struct Plan {
   SolverKind kind = SolverKind::dense;
   std::string reason;
-  bool mixed = false;  ///< float inside the solver
+  bool mixed = false;   ///< float inside the solver
+  Clusters clusters{};  ///< of an iterative solver's coarse space, as count_work finds them
 };
 
 /// Whether the solver has a variant with float inside, and whether that is the quicker one: a pure

@@ -54,7 +54,7 @@ bool huge_pages() {
 
 std::size_t mapped_bytes(std::size_t bytes) {
   const std::size_t over = bytes % kHugePage;
-  return over > kHugePage / 2 && huge_pages() ? bytes - over + kHugePage : round_up(bytes, kPage);
+  return over > kHugePage / 4 && huge_pages() ? bytes - over + kHugePage : round_up(bytes, kPage);
 }
 
 #if defined(SHEAF_PLAIN_MEMORY)

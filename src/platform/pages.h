@@ -12,7 +12,7 @@ namespace sheaf {
 /// a large array, touching 4 KiB at a time for the first time costs more than filling it.
 constexpr std::size_t kMappedFrom = std::size_t(1) << 19;
 
-/// Bytes mapped for an array of so many: whole huge pages, and small pages for less than half of
+/// Bytes mapped for an array of so many: whole huge pages, and small pages for up to a quarter of
 /// one; small pages alone where the system has no others.
 std::size_t mapped_bytes(std::size_t bytes);
 

@@ -85,11 +85,12 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   }
   Threads threads(options.threads);
   Columns columns = number_columns(problem, options.fixed);
-  Batches batches = arrange(problem, skip);
-  WorkCounts counts = count_work(batches, columns, options.fixed.points);
+  Batches batches = arrange(problem, skip, threads);
+  Clusters clusters;
+  WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
   counts.weighted = options.loss.kind != LossKind::none;
-  Result<Choice> choice = choose_solver(counts, options, threads.count(),
-                                        {resident_bytes(), peak_resident_bytes()});
+  Result<Choice> choice =
+      choose_solver(counts, options, threads.count(), {resident_bytes(), peak_resident_bytes()});
   if (!choice.ok()) return choice.error();
   summary.solver = to_string(choice.value().plan.kind);
   summary.solver_reason = choice.value().plan.reason;
@@ -99,6 +100,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   summary.loss = options.loss.kind;
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
+  choice.value().plan.clusters = std::move(clusters);
 
   const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
                          options.inner_iterations};
