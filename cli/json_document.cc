@@ -42,6 +42,7 @@ Json options_json(const SolveArguments& a) {
           {"loss", a.loss},
           {"cheirality", a.cheirality},
           {"fix", fix},
+          {"points", a.points},
           {"solver", a.solver},
           {"precision", a.precision},
           {"memory_limit_bytes", a.memory_limit_bytes},

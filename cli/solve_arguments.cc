@@ -21,6 +21,10 @@ namespace {
 const std::map<std::string, Cheirality> kCheiralities = {{"formula", Cheirality::formula},
                                                          {"reject", Cheirality::reject},
                                                          {"hold-out", Cheirality::hold_out}};
+const std::map<std::string, PointParametrisation> kParametrisations = {
+    {"xyz", PointParametrisation::xyz},
+    {"homogeneous", PointParametrisation::homogeneous},
+    {"inverse-depth", PointParametrisation::inverse_depth}};
 const std::map<std::string, CameraSolverKind> kSolvers = {
     {"auto", CameraSolverKind::automatic},
     {"dense", CameraSolverKind::dense},
@@ -192,6 +196,13 @@ void add_model_options(CLI::App& verb, SolveArguments& a) {
       ->type_name("RULE")
       ->check(one_of({"formula", "reject", "hold-out"}))
       ->capture_default_str();
+  verb.add_option("--points", a.points,
+                  "the coordinates in which a point steps: xyz, homogeneous (a unit 4-vector) or "
+                  "inverse-depth (bearing and inverse depth from the first image that sees it); "
+                  "the last two pass through infinity")
+      ->type_name("NAME")
+      ->check(one_of({"xyz", "homogeneous", "inverse-depth"}))
+      ->capture_default_str();
   verb.add_option(
           "--fix", a.fix,
           "hold these to the last bit: a comma-separated list of points, poses, intrinsics, "
@@ -241,6 +252,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   parse_loss(a.loss, options.loss);
   options.cheirality = kCheiralities.at(a.cheirality);
   if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
+  options.points = kParametrisations.at(a.points);
   options.solver = kSolvers.at(a.solver);
   options.precision = kPrecisions.at(a.precision);
   options.memory_limit_bytes = a.memory_limit_bytes;

@@ -17,6 +17,7 @@ struct SolveArguments {
   double time_limit_s = 0;  ///< 0: none
   std::string loss = "none";
   std::string cheirality = "formula";
+  std::string points = "xyz";
   std::string fix;
   std::string solver = "auto";
   std::string precision = "auto";

@@ -21,6 +21,13 @@ enum class Cheirality {
   hold_out,  ///< those behind at the start are left out (and listed); then as reject
 };
 
+/// In which coordinates a point steps. It is stored as X, Y, Z in any case.
+enum class PointParametrisation {
+  xyz,            ///< X, Y, Z
+  homogeneous,    ///< a unit 4-vector about the middle of the cameras: passes through infinity
+  inverse_depth,  ///< bearing and inverse depth from the first image that sees it: likewise
+};
+
 /// Instruction set of the hot kernels.
 enum class Simd { best, scalar, sse4, avx2, avx512 };
 
@@ -49,6 +56,7 @@ struct SolveOptions {
   Loss loss{};                                                    ///< none, or as in `Huber{1.0}`
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
+  PointParametrisation points = PointParametrisation::xyz;
   Fixed fixed{};
   CameraSolverKind solver = CameraSolverKind::automatic;
   Precision precision = Precision::automatic;

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "linear/scaling.h"
 #include "linear/slices.h"
 
 namespace sheaf {
@@ -14,6 +15,8 @@ namespace sheaf {
 namespace {
 
 constexpr std::size_t kGroupsPerTask = 1024;
+/// Of the units that the linear system's products with points are computed in.
+constexpr double kRounding = 1.1e-16, kFloatRounding = 6e-8;
 
 /// Points that are held couple no images: no pairs. Lists number records with 16 bits, too few for
 /// the longest tracks: sums then run over the records in their own order.
@@ -39,6 +42,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
                            const PointRules& rules, const Plan& plan, const Kernels& kernels,
                            Threads& threads)
     : rules_(rules),
+      float_products_(plan.mixed && plan.kind == SolverKind::implicit_cg),
       kernels_(kernels),
       threads_(threads),
       batches_(std::move(batches)),
@@ -46,6 +50,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
                               lists_for(plan.kind, rules.held, batches_.longest_track), threads)),
       columns_(std::move(columns)) {
   fill_state(problem);
+  place_charts();
   const std::size_t slices = chunks_.slices.size() - 1;
   factors_.allocate(kFactorGroup * batches_.groups.size());
   tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
@@ -107,6 +112,29 @@ void BundleSystem::fill_state(const Problem& problem) {
   });
 }
 
+/// Homogeneous points are about the mean camera centre, in units of the cameras' mean distance from
+/// it, so that neither the place of the scene nor its unit matters. Points that are held have no
+/// charts: nothing of them may move.
+void BundleSystem::place_charts() {
+  if (rules_.held || rules_.charts == ChartBase::none) return;
+  const std::size_t images = poses_.size();
+  const auto centre = [&](std::size_t image, int k) {
+    const double *R = &cameras_[kCameraRecord * image], *t = R + camera_record::kTranslation;
+    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  };
+  chart_.base = rules_.charts;
+  chart_.crosses = !rules_.watch_behind;
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < images; ++i) chart_.origin[k] += centre(i, k);
+    chart_.origin[k] /= static_cast<double>(images);
+  }
+  double length = 0;
+  for (std::size_t i = 0; i < images; ++i)
+    length += std::hypot(centre(i, 0) - chart_.origin[0], centre(i, 1) - chart_.origin[1],
+                         centre(i, 2) - chart_.origin[2]);
+  chart_.unit = towards_one(length / static_cast<double>(images));
+}
+
 void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                                        const double* parameters, double* records) {
   double* record = records + kCameraRecord * image;
@@ -124,8 +152,9 @@ Step BundleSystem::propose(const StepRequest& request) {
   loss_ = request.loss;
   const std::size_t weights = loss_.kind == LossKind::none ? 0 : 8 * batches_.num_batches();
   if (weights_.size() != weights) weights_.allocate(weights);
-  const EliminateInput in{&batches_,   &chunks_, cameras_.data(), points_.data(), request.damping,
-                          rules_.held, loss_};
+  chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
+  const EliminateInput in{&batches_,       &chunks_,    cameras_.data(), points_.data(),
+                          request.damping, rules_.held, loss_,           chart_};
   if (coarse_) coarse_->place(cameras_.data());
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
@@ -234,7 +263,8 @@ Trial BundleSystem::trial() {
                       rules_.held ? 0 : rules_.inner_iterations,
                       mean_square_,
                       loss_,
-                      weights_.data()};
+                      weights_.data(),
+                      chart_};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};

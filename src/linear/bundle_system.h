@@ -26,7 +26,8 @@ struct PointRules {
   bool held = false;
   /// Count in each trial the observations that newly go behind their camera.
   bool watch_behind = false;
-  int inner_iterations = 0;  ///< of each point by itself, once the cameras have stepped
+  int inner_iterations = 0;            ///< of each point by itself, once the cameras have stepped
+  ChartBase charts = ChartBase::none;  ///< what their local coordinates are about
 };
 
 /// Reprojection rows on CPU threads. The order of every sum is fixed by the problem: chunks within
@@ -52,6 +53,7 @@ class BundleSystem : public System {
   void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                            const double* parameters, double* records);
   void make_coarse_space(const Plan& plan);
+  void place_charts();
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool solve_cameras(const StepRequest& request, Step& step);
   double step_cameras();
@@ -59,6 +61,7 @@ class BundleSystem : public System {
   double cost_of(double square_sum, double loss_sum) const;
 
   const PointRules rules_;
+  const bool float_products_;  ///< until StepRequest::precise
   const Kernels& kernels_;
   Threads& threads_;
   Batches batches_;
@@ -76,6 +79,7 @@ class BundleSystem : public System {
   Buffer<double> tiles_, diagonal_;      ///< one set per slice, the first ends up as the sum
   std::vector<Buffer<double>> scratch_;  ///< one per thread
   CameraVectors vectors_;
+  ChartRules chart_;  ///< of the points' steps
   Buffer<double> damping_, camera_step_;
   std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   std::unique_ptr<CameraSolver> solver_;

@@ -74,6 +74,18 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   return {};
 }
 
+ChartBase chart_base(PointParametrisation points) {
+  switch (points) {
+    case PointParametrisation::xyz:
+      return ChartBase::none;
+    case PointParametrisation::homogeneous:
+      return ChartBase::origin;
+    case PointParametrisation::inverse_depth:
+      return ChartBase::host;
+  }
+  return ChartBase::none;
+}
+
 /// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
 Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
                     const Stopwatch& clock, Summary& summary) {
@@ -103,7 +115,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   choice.value().plan.clusters = std::move(clusters);
 
   const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
-                         options.inner_iterations};
+                         options.inner_iterations, chart_base(options.points)};
   BundleSystem system(problem, std::move(batches), std::move(columns), rules, choice.value().plan,
                       kernels, threads);
   if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;

@@ -35,7 +35,7 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--min-depth"});
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--loss", "--cheirality", "--fix", "--solver", "--memory-limit",
+                    "--loss", "--cheirality", "--points", "--fix", "--solver", "--memory-limit",
                     "--initial-damping", "--inner-iterations", "--simd", "--precision"});
   return options;
 }
