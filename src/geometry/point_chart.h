@@ -31,6 +31,9 @@ struct ChartRules {
 
 /// A step ends within this distance x 1 / unit: pixels there are those at infinity to 1e-9.
 constexpr double kFarthest = 1e12;
+/// Where points may not cross, one beyond this x 1 / unit that is pulled outwards is at its bound:
+/// its outward coordinate is damped by kAtBound instead of lambda.
+constexpr double kBound = 1e9, kAtBound = 1e12;
 
 /// The chart of a point at base + Y. With n = Y / |Y|, t1 and t2 across it, and the reach
 ///   N = |Y| (host)   or   N = sqrt(|Y|^2 + 1 / unit^2) (origin),

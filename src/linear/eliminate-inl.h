@@ -143,9 +143,11 @@ HWY_INLINE void factor_by_xyz(const LaneChart& chart, const Factor& f, const V* 
                     hn::Mul(chart.outward, chart.n[k])};
     forward(f, s, m[k]);
   }
+  V inverse[3];
   for (int i = 2; i >= 0; --i) {  // Gram and Schmidt, from the last column
     N[i][i] = hn::Sqrt(dot3(m[i], m[i]));
-    for (V& x : m[i]) x = hn::Div(x, N[i][i]);
+    inverse[i] = hn::Div(set(1.0), N[i][i]);
+    for (V& x : m[i]) x = hn::Mul(x, inverse[i]);
     const auto take = [&](V* from) {
       const V along = dot3(m[i], from);
       for (int k = 0; k < 3; ++k) from[k] = fnma(m[i][k], along, from[k]);
@@ -155,16 +157,20 @@ HWY_INLINE void factor_by_xyz(const LaneChart& chart, const Factor& f, const V* 
     for (int k = 0; k < i; ++k) N[i][k] = take(m[k]);
   }
   out.i00 = N[0][0], out.i11 = N[1][1], out.i22 = N[2][2];
-  out.l10 = hn::Neg(hn::Div(N[1][0], hn::Mul(N[0][0], N[1][1])));
-  out.l21 = hn::Neg(hn::Div(N[2][1], hn::Mul(N[1][1], N[2][2])));
-  out.l20 = hn::Neg(hn::Div(fma(out.l21, N[1][0], hn::Div(N[2][0], N[2][2])), N[0][0]));
+  out.l10 = hn::Neg(hn::Mul(hn::Mul(N[1][0], inverse[0]), inverse[1]));
+  out.l21 = hn::Neg(hn::Mul(hn::Mul(N[2][1], inverse[1]), inverse[2]));
+  out.l20 = hn::Neg(hn::Mul(fma(out.l21, N[1][0], hn::Mul(N[2][0], inverse[2])), inverse[0]));
 }
 
-/// Damping of the outward coordinate, at least as ChartRules::rounding asks for.
+/// Damping of the outward coordinate: more where rounding would pass for parallax, and where the
+/// point is at its bound (ChartRules).
 HWY_INLINE V damp_outward(const ChartRules& rules, const LaneChart& chart, const PointSums& p,
                           V damping) {
   const V least = hn::Mul(set(rules.rounding * rules.unit), chart.reach);
-  return hn::Max(damping, hn::Mul(hn::Mul(least, least), hn::Add(p.v00, p.v11)));
+  damping = hn::Max(damping, hn::Mul(hn::Mul(least, least), hn::Add(p.v00, p.v11)));
+  if (rules.crosses) return damping;
+  const auto bound = hn::And(hn::Gt(chart.reach, set(kBound / rules.unit)), hn::Gt(p.g[2], zero()));
+  return hn::Max(damping, hn::IfThenElseZero(bound, damp(set(kAtBound), p.v22)));
 }
 
 struct EliminateSums {

@@ -45,13 +45,13 @@ struct LaneChart {
     const V r2 = dot3(Y, Y);
     const double soft2 = rules.base == ChartBase::origin ? 1 / (rules.unit * rules.unit) : 0;
     reach2 = hn::Add(r2, set(soft2));
-    reach = hn::Sqrt(reach2);
-    outward = hn::Mul(set(rules.unit), reach2);
     const V r = hn::Sqrt(r2), one = set(1.0);
+    reach = soft2 == 0 ? r : hn::Sqrt(reach2);
+    outward = hn::Mul(set(rules.unit), reach2);
     const auto away = hn::Gt(r, set(1e-150));
-    n[0] = hn::IfThenElseZero(away, hn::Div(Y[0], r));
-    n[1] = hn::IfThenElseZero(away, hn::Div(Y[1], r));
-    n[2] = hn::IfThenElse(away, hn::Div(Y[2], r), one);
+    const V inverse = hn::IfThenElseZero(away, hn::Div(one, r));
+    for (int i = 0; i < 3; ++i) n[i] = hn::Mul(Y[i], inverse);
+    n[2] = hn::IfThenElse(away, n[2], one);
     const V sign = hn::IfThenElse(hn::Lt(n[2], zero()), set(-1.0), one);
     const V a = hn::Div(set(-1.0), hn::Add(sign, n[2])), b = hn::Mul(hn::Mul(n[0], n[1]), a);
     t1[0] = fma(hn::Mul(sign, n[0]), hn::Mul(n[0], a), one);
@@ -75,8 +75,9 @@ struct LaneChart {
   }
   /// q with dX/dq q = d.
   HWY_INLINE void coordinates(const V* d, V* q) const {
-    q[0] = hn::Div(dot3(t1, d), reach);
-    q[1] = hn::Div(dot3(t2, d), reach);
+    const V inverse = hn::Div(set(1.0), reach);
+    q[0] = hn::Mul(dot3(t1, d), inverse);
+    q[1] = hn::Mul(dot3(t2, d), inverse);
     q[2] = hn::Div(dot3(n, d), outward);
   }
   /// Where the point ends after the step d of X - base, from the base.
@@ -87,18 +88,20 @@ struct LaneChart {
     V kept = hn::Max(left, least);
     if (rules.crosses)
       kept = hn::IfThenElse(hn::Lt(left, zero()), hn::Min(left, hn::Neg(least)), kept);
-    for (int i = 0; i < 3; ++i) out[i] = hn::Div(hn::Add(Y[i], fnma(far, Y[i], d[i])), kept);
+    const V stretch = hn::Div(set(1.0), kept);
+    for (int i = 0; i < 3; ++i) out[i] = hn::Mul(hn::Add(Y[i], fnma(far, Y[i], d[i])), stretch);
   }
 };
 
-/// chart_step2 of the points before and after.
-HWY_INLINE V chart_step2_lanes(const ChartRules& rules, const LaneChart& before,
-                               const LaneChart& after) {
-  const V s = set(1 / rules.unit);
+/// chart_step2 of the points before and after, which end at Y from their bases.
+HWY_INLINE V chart_step2_lanes(const ChartRules& rules, const LaneChart& before, const V* Y) {
+  const double s = 1 / rules.unit, soft2 = rules.base == ChartBase::origin ? s * s : 0;
+  const V reach = hn::Sqrt(hn::Add(dot3(Y, Y), set(soft2)));
+  const V u_scale = hn::Div(set(1.0), before.reach), v_scale = hn::Div(set(1.0), reach);
   V same = zero(), minus = zero(), plus = zero();
   for (int i = 0; i < 4; ++i) {
-    const V u = hn::Div(i < 3 ? before.Y[i] : s, before.reach);
-    const V v = hn::Div(i < 3 ? after.Y[i] : s, after.reach);
+    const V u = hn::Mul(i < 3 ? before.Y[i] : set(s), u_scale);
+    const V v = hn::Mul(i < 3 ? Y[i] : set(s), v_scale);
     const V less = hn::Sub(u, v), more = hn::Add(u, v);
     same = fma(u, v, same);
     minus = fma(less, less, minus);

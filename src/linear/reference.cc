@@ -74,6 +74,9 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   if (!at.plain()) {
     const double least = in.chart.rounding * in.chart.unit;
     D[2] = std::max(D[2], least * least * at.chart.reach2 * (V[0] + V[1]));
+    const bool far = !in.chart.crosses && at.chart.reach * in.chart.unit > kBound;
+    if (far && at.chart.transpose(gradient)[2] > 0)
+      D[2] = std::max(D[2], kAtBound * std::clamp(V[2], kDiagonalFloor, kDiagonalCeiling));
   }
   at.damp(D, 1, A);
   Factor3 f = Factor3::of(A);

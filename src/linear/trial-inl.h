@@ -245,9 +245,8 @@ struct ChartedStep {
 
   /// Size of the step to y, refined or not.
   HWY_INLINE V size2(const TrialInput& in, V mask, const Refined& y) const {
-    LaneChart to;
-    to.place(in.chart, y.X0, y.X1, y.X2, moved);
-    return hn::IfThenElseZero(hn::Gt(mask, zero()), chart_step2_lanes(in.chart, from, to));
+    const V Y[3] = {hn::Sub(y.X0, moved[0]), hn::Sub(y.X1, moved[1]), hn::Sub(y.X2, moved[2])};
+    return hn::IfThenElseZero(hn::Gt(mask, zero()), chart_step2_lanes(in.chart, from, Y));
   }
 };
 
