@@ -95,6 +95,10 @@ constexpr double kWorthMore = 0.1;  ///< after a larger one, another step is loo
 /// Of the step's own D. Measured: 1 costs iterations, 0.1 led ladybug-49 into a worse minimum from
 /// some starting dampings.
 constexpr double kDamping = 0.3;
+/// In a chart a point that the step leaves worse than this, and worse than if it had only followed
+/// its base, follows its base: its distance is damped by what is seen of it, which may be little,
+/// and a long step can end anywhere, in a camera's plane too.
+constexpr double kLost = 100;
 }  // namespace inner_iterations
 
 struct TrialOutput {

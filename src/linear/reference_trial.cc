@@ -36,9 +36,17 @@ PointCost cost_of(const TrialInput& in, const Batches::Group& group, const Vecto
 
 /// Inner iterations (kernels.h) of one point from X; returns the cost where it ends.
 PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::uint32_t lane,
-                       const double* factor, const Vector3<double>& base, Vector3<double>& X) {
+                       const double* factor, const Vector3<double>& base,
+                       const Vector3<double>& stay, Vector3<double>& X) {
   PointCost best = cost_of(in, group, X, lane);
   const double mean = in.mean_square * group.track;
+  const bool charted = in.chart.base != ChartBase::none && in.inner_iterations > 0;
+  if (charted && !(best.cost <= inner_iterations::kLost * mean)) {
+    const PointCost there = cost_of(in, group, stay, lane);
+    const bool worse = !(there.cost < best.cost);
+    if (worse && best.cost == best.cost) return best;
+    X = stay, best = there;
+  }
   const Vector3<double> D{factor[72], factor[80], factor[88]};
   for (int step = 0; step < in.inner_iterations; ++step) {
     const PointCoordinates at(in.chart, base, X);
@@ -75,7 +83,9 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
   const Vector3<double> moved = base_of(in.chart, batches, group, lane, in.trial_cameras);
   const Vector3<double> q = at.of(d);
   Vector3<double> Y = real ? at.step(d, moved) : X;
-  const PointCost cost = real ? refine_point(in, group, lane, factor, moved, Y) : PointCost();
+  const Vector3<double> stay =
+      at.step({moved[0] - at.base[0], moved[1] - at.base[1], moved[2] - at.base[2]}, moved);
+  const PointCost cost = real ? refine_point(in, group, lane, factor, moved, stay, Y) : PointCost();
   double d2 = 0, x2 = 1e-300;
   for (int i = 0; i < 3; ++i) {
     out.points[kPointGroup * g + 8 * i + lane] = Y[i];

@@ -151,19 +151,48 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
   return {square, Robust ? cost : square};
 }
 
+/// Points of a chart that their step has lost (kernels.h, kLost) go back to `stay`, where that is
+/// better. Returns the lanes that are not lost.
+template <bool Robust>
+HWY_INLINE hn::Mask<D> recover_points(const TrialInput& in, const Batches::Group& group, int lane,
+                                      V mask, const V* base, const V* stay, LaneChart& chart,
+                                      PointSums& p, Refined& best) {
+  const V most = set(inner_iterations::kLost * in.mean_square * group.track);
+  const auto real = hn::Gt(mask, zero());
+  const auto sound = hn::Or(hn::Not(real), hn::Le(best.at.cost, most));
+  if (hn::AllTrue(D(), sound)) return real;
+  Refined other{hn::IfThenElse(sound, best.X0, stay[0]),
+                hn::IfThenElse(sound, best.X1, stay[1]),
+                hn::IfThenElse(sound, best.X2, stay[2]),
+                {zero(), zero()}};
+  chart.place(in.chart, other.X0, other.X1, other.X2, base);
+  other.at = pass_group<Robust, true>(in, group, lane, other.X0, other.X1, other.X2, &chart, p);
+  const auto worse = hn::And(hn::Not(sound), hn::Not(hn::Lt(other.at.cost, best.at.cost)));
+  const auto finite = hn::Eq(best.at.cost, best.at.cost);
+  const auto keep = hn::And(worse, finite);
+  best = {hn::IfThenElse(keep, best.X0, other.X0),
+          hn::IfThenElse(keep, best.X1, other.X1),
+          hn::IfThenElse(keep, best.X2, other.X2),
+          {hn::IfThenElse(keep, best.at.square, other.at.square),
+           hn::IfThenElse(keep, best.at.cost, other.at.cost)}};
+  return hn::And(real, hn::Not(keep));
+}
+
 /// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
 /// worth a pass and lower that point's own cost (kernels.h, inner_iterations). base: of the charts,
-/// where the stepped cameras have it.
+/// where the stepped cameras have it; stay: the points, had they only followed it.
 template <bool Robust, bool Charted>
 HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group, int lane,
                               const double* pd, V mask, [[maybe_unused]] const V* base,
-                              Refined& best) {
+                              [[maybe_unused]] const V* stay, Refined& best) {
   LaneChart chart;
   const LaneChart* const used = Charted ? &chart : nullptr;
   if constexpr (Charted) chart.place(in.chart, best.X0, best.X1, best.X2, base);
   PointSums p;
   best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, used, p);
   auto active = hn::Gt(mask, zero());
+  if constexpr (Charted)
+    active = recover_points<Robust>(in, group, lane, mask, base, stay, chart, p, best);
   const double mean = in.mean_square * group.track;
   const V worth_one = set(inner_iterations::kWorthOne * mean);
   const V worth_more = set(inner_iterations::kWorthMore * mean);
@@ -221,6 +250,7 @@ HWY_INLINE V count_crossed(const TrialInput& in, const Batches::Group& group, in
 /// The step of a part's points in their charts.
 struct ChartedStep {
   V base[3], moved[3];  ///< of the charts, before and after the cameras stepped
+  V stay[3];            ///< the points, had they only followed it
   LaneChart from;
 
   /// d: by X, Y, Z. Returns q^T D q of its coordinates q.
@@ -234,6 +264,7 @@ struct ChartedStep {
     for (int i = 0; i < 3; ++i) {
       damping = fma(hn::Mul(q[i], q[i]), load(pd + 8 * (9 + i)), damping);
       e[i] = hn::Sub(d[i], hn::Sub(moved[i], base[i]));
+      stay[i] = hn::Add(moved[i], from.Y[i]);
     }
     from.retract(in.chart, e, to);
     const auto real = hn::Gt(mask, zero());
@@ -275,7 +306,7 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   if constexpr (Charted) damping = charted.take(in, group, lane, pd, mask, X, d, y);
   PointSums unused;
   if (in.inner_iterations > 0)
-    refine_points<Robust, Charted>(in, group, lane, pd, mask, charted.moved, y);
+    refine_points<Robust, Charted>(in, group, lane, pd, mask, charted.moved, charted.stay, y);
   else
     y.at = pass_group<Robust, false>(in, group, lane, y.X0, y.X1, y.X2, nullptr, unused);
   double* Y = stepped + kPointGroup * g + lane;
