@@ -173,6 +173,25 @@ HWY_INLINE V damp_outward(const ChartRules& rules, const LaneChart& chart, const
   return hn::Max(damping, hn::IfThenElseZero(bound, damp(set(kAtBound), p.v22)));
 }
 
+/// Marquardt's damping of a part's points and the factor of V + D.
+struct DampedFactor {
+  Factor f;
+  V D[3];
+
+  template <bool Charted>
+  HWY_INLINE void compute(const EliminateInput& in, const PointSums& p,
+                          [[maybe_unused]] const LaneChart& chart) {
+    const V lambda = set(in.damping);
+    D[0] = damp(lambda, p.v00), D[1] = damp(lambda, p.v11), D[2] = damp(lambda, p.v22);
+    if constexpr (Charted) D[2] = damp_outward(in.chart, chart, p, D[2]);
+    f = factor3(hn::Add(p.v00, D[0]), p.v01, p.v02, hn::Add(p.v11, D[1]), p.v12,
+                hn::Add(p.v22, D[2]));
+    if (!in.points_held) return;  // L^-1 = 0: nothing is eliminated, nothing moves
+    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
+    D[0] = D[1] = D[2] = zero();
+  }
+};
+
 struct EliminateSums {
   V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
@@ -228,15 +247,9 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   sums.square[part] = square;
   sums.loss[part] = robust;
 
-  const V lambda = set(in.damping);
-  V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
-  if constexpr (Charted) D2 = damp_outward(in.chart, chart, p, D2);
-  Factor f =
-      factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12, hn::Add(p.v22, D2));
-  if (in.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
-    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
-    D0 = D1 = D2 = zero();
-  }
+  DampedFactor damped;
+  damped.compute<Charted>(in, p, chart);
+  const Factor& f = damped.f;
   V w[3];
   forward(f, p.g, w);
   const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
@@ -246,7 +259,8 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   Factor x = f;
   V y[3] = {w[0], w[1], w[2]};
   if constexpr (Charted) factor_by_xyz(chart, f, w, x, y);
-  const V all[12] = {x.i00, x.l10, x.l20, x.i11, x.l21, x.i22, y[0], y[1], y[2], D0, D1, D2};
+  const V all[12] = {x.i00, x.l10, x.l20, x.i11,       x.l21,       x.i22,
+                     y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
   for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
 
   for (std::uint32_t o = 0; o < group.track; ++o)

@@ -31,8 +31,8 @@ inline void write_step(const double* lens, const double* x, double* step) {
 /// Points: 24 doubles per group: X of the eight lanes, then Y, then Z.
 constexpr std::size_t kPointGroup = 24;
 /// What elimination leaves per group, 8 lanes each: the factor L^-1 with V + D = L L^T stored as
-/// i00, l10, l20, i11, l21, i22 (diagonal inverted), w = L^-1 g (3), D (3). V, L, g and w are by X, Y
-/// and Z, whatever the chart; D is by the chart's coordinates.
+/// i00, l10, l20, i11, l21, i22 (diagonal inverted), w = L^-1 g (3), D (3). V, L, g and w are by X,
+/// Y and Z, whatever the chart; D is by the chart's coordinates.
 constexpr std::size_t kFactorGroup = 96;
 
 /// Column order of a camera block: rho (3), phi (3), f, k1, k2.
@@ -98,7 +98,7 @@ constexpr double kDamping = 0.3;
 /// In a chart a point that the step leaves worse than this, and worse than if it had only followed
 /// its base, follows its base: its distance is damped by what is seen of it, which may be little,
 /// and a long step can end anywhere, in a camera's plane too.
-constexpr double kLost = 100;
+constexpr double kLost = 1e4;
 }  // namespace inner_iterations
 
 struct TrialOutput {

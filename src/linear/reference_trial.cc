@@ -43,9 +43,7 @@ PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::u
   const bool charted = in.chart.base != ChartBase::none && in.inner_iterations > 0;
   if (charted && !(best.cost <= inner_iterations::kLost * mean)) {
     const PointCost there = cost_of(in, group, stay, lane);
-    const bool worse = !(there.cost < best.cost);
-    if (worse && best.cost == best.cost) return best;
-    X = stay, best = there;
+    if (!(best.cost <= there.cost)) X = stay, best = there;
   }
   const Vector3<double> D{factor[72], factor[80], factor[88]};
   for (int step = 0; step < in.inner_iterations; ++step) {

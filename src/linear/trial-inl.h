@@ -152,30 +152,25 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
 }
 
 /// Points of a chart that their step has lost (kernels.h, kLost) go back to `stay`, where that is
-/// better. Returns the lanes that are not lost.
+/// better.
 template <bool Robust>
-HWY_INLINE hn::Mask<D> recover_points(const TrialInput& in, const Batches::Group& group, int lane,
-                                      V mask, const V* base, const V* stay, LaneChart& chart,
-                                      PointSums& p, Refined& best) {
+HWY_INLINE void recover_points(const TrialInput& in, const Batches::Group& group, int lane, V mask,
+                               const V* base, const V* stay, LaneChart& chart, PointSums& p,
+                               Refined& best) {
   const V most = set(inner_iterations::kLost * in.mean_square * group.track);
-  const auto real = hn::Gt(mask, zero());
-  const auto sound = hn::Or(hn::Not(real), hn::Le(best.at.cost, most));
-  if (hn::AllTrue(D(), sound)) return real;
-  Refined other{hn::IfThenElse(sound, best.X0, stay[0]),
-                hn::IfThenElse(sound, best.X1, stay[1]),
-                hn::IfThenElse(sound, best.X2, stay[2]),
-                {zero(), zero()}};
-  chart.place(in.chart, other.X0, other.X1, other.X2, base);
-  other.at = pass_group<Robust, true>(in, group, lane, other.X0, other.X1, other.X2, &chart, p);
-  const auto worse = hn::And(hn::Not(sound), hn::Not(hn::Lt(other.at.cost, best.at.cost)));
-  const auto finite = hn::Eq(best.at.cost, best.at.cost);
-  const auto keep = hn::And(worse, finite);
-  best = {hn::IfThenElse(keep, best.X0, other.X0),
-          hn::IfThenElse(keep, best.X1, other.X1),
-          hn::IfThenElse(keep, best.X2, other.X2),
-          {hn::IfThenElse(keep, best.at.square, other.at.square),
-           hn::IfThenElse(keep, best.at.cost, other.at.cost)}};
-  return hn::And(real, hn::Not(keep));
+  const auto sound = hn::Or(hn::Eq(mask, zero()), hn::Le(best.at.cost, most));
+  if (hn::AllTrue(D(), sound)) return;
+  const V Y0 = hn::IfThenElse(sound, best.X0, stay[0]),
+          Y1 = hn::IfThenElse(sound, best.X1, stay[1]),
+          Y2 = hn::IfThenElse(sound, best.X2, stay[2]);
+  const TrackCost there = pass_group<Robust, false>(in, group, lane, Y0, Y1, Y2, nullptr, p);
+  // Not finite is not less.
+  const auto keep = hn::Or(sound, hn::Le(best.at.cost, there.cost));
+  best.X0 = hn::IfThenElse(keep, best.X0, Y0);
+  best.X1 = hn::IfThenElse(keep, best.X1, Y1);
+  best.X2 = hn::IfThenElse(keep, best.X2, Y2);
+  chart.place(in.chart, best.X0, best.X1, best.X2, base);
+  best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, &chart, p);
 }
 
 /// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
@@ -191,8 +186,7 @@ HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group,
   PointSums p;
   best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, used, p);
   auto active = hn::Gt(mask, zero());
-  if constexpr (Charted)
-    active = recover_points<Robust>(in, group, lane, mask, base, stay, chart, p, best);
+  if constexpr (Charted) recover_points<Robust>(in, group, lane, mask, base, stay, chart, p, best);
   const double mean = in.mean_square * group.track;
   const V worth_one = set(inner_iterations::kWorthOne * mean);
   const V worth_more = set(inner_iterations::kWorthMore * mean);
