@@ -61,7 +61,11 @@ struct SolveOptions {
   CameraSolverKind solver = CameraSolverKind::automatic;
   Precision precision = Precision::automatic;
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
-  double initial_damping = 0;            ///< 0: the default rule
+  /// The solver may free the problem's observations while it runs and put them back at the end, in
+  /// memory that it no longer needs: a third off the peak of the largest problems. Nobody else may
+  /// look at the problem meanwhile; should memory run out, it is left without observations.
+  bool lend_observations = false;
+  double initial_damping = 0;  ///< 0: the default rule
   /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras
   /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
   int inner_iterations = 3;

@@ -38,14 +38,14 @@ ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_tr
 
 }  // namespace
 
-BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns columns,
+BundleSystem::BundleSystem(const Problem& problem, const Batches& batches, Columns columns,
                            const PointRules& rules, const Plan& plan, const Kernels& kernels,
                            Threads& threads)
     : rules_(rules),
       float_products_(plan.mixed && plan.kind == SolverKind::implicit_cg),
       kernels_(kernels),
       threads_(threads),
-      batches_(std::move(batches)),
+      batches_(batches),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
                               lists_for(plan.kind, rules.held, batches_.longest_track), threads)),
       columns_(std::move(columns)) {

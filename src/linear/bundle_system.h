@@ -34,9 +34,9 @@ struct PointRules {
 /// a slice in order, slices in order; so the bytes do not depend on the number of threads.
 class BundleSystem : public System {
  public:
-  /// Throws std::bad_alloc.
-  BundleSystem(const Problem& problem, Batches batches, Columns columns, const PointRules& rules,
-               const Plan& plan, const Kernels& kernels, Threads& threads);
+  /// The batches must outlive it. Throws std::bad_alloc.
+  BundleSystem(const Problem& problem, const Batches& batches, Columns columns,
+               const PointRules& rules, const Plan& plan, const Kernels& kernels, Threads& threads);
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;
@@ -64,7 +64,7 @@ class BundleSystem : public System {
   const bool float_products_;  ///< until StepRequest::precise
   const Kernels& kernels_;
   Threads& threads_;
-  Batches batches_;
+  const Batches& batches_;
   Chunks chunks_;
   Columns columns_;
 

@@ -85,13 +85,16 @@ void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, 
   sum.add(c.images, 8 * kCoarseBasis);
 }
 
-/// The images of each pair of observations of one point.
+/// Pairs looked at in one sample, and worth sampling for.
+constexpr std::uint64_t kWorthCounting = 500000;
+
+/// The images of each pair of observations of one point, as far as there is room.
 void list_pairs(const Batches& batches, const Batches::Group& group,
                 std::vector<std::uint64_t>& keys) {
   const std::uint32_t* image = &batches.image[8 * group.first_batch];
   for (std::uint32_t l = 0; l < group.lanes; ++l)
-    for (std::uint32_t o = 1; o < group.track; ++o)
-      for (std::uint32_t i = 0; i < o; ++i)
+    for (std::uint32_t o = 1; o < group.track && keys.size() < kWorthCounting; ++o)
+      for (std::uint32_t i = 0; i < o && keys.size() < kWorthCounting; ++i)
         keys.push_back(std::uint64_t(image[8 * o + l]) << 32 | image[8 * i + l]);
 }
 
@@ -124,7 +127,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
 }
 
 std::uint64_t estimate_pair_runs(const Batches& batches, const WorkCounts& c) {
-  constexpr std::uint64_t kWorthCounting = 500000, kSampled = 16;
+  constexpr std::uint64_t kSampled = 16;
   const std::uint64_t chunks = count_chunks(c);
   const std::uint64_t bound = std::min(c.pairs, chunks * c.tiles);
   if (bound < kWorthCounting) return bound;
@@ -135,6 +138,7 @@ std::uint64_t estimate_pair_runs(const Batches& batches, const WorkCounts& c) {
     auto group = std::partition_point(
         batches.groups.begin(), batches.groups.end(),
         [&](const Batches::Group& g) { return g.first_batch < c.batches / kSampled * s; });
+    if (group == batches.groups.end()) --group;
     const std::uint64_t end = group->first_batch + Chunks::kBatchesPerChunk;
     do list_pairs(batches, *group++, keys);
     while (group != batches.groups.end() && group->first_batch + group->track <= end &&

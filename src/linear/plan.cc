@@ -178,11 +178,15 @@ Plan plan_solver(const WorkCounts& c) {
                             " iterative explicit, " + milliseconds(implicit_cg) +
                             " iterative implicit";
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
+  if (too_long)
+    return {SolverKind::implicit_cg, counts + ": a point is seen " +
+                                         std::to_string(c.longest_track) +
+                                         " times, too often to form the camera matrix"};
   // Exact steps are fewer: conjugate gradients must save something that can be felt.
   const double iterative = std::min(explicit_cg, implicit_cg) + kWorthIterating;
-  if (std::min(dense, sparse) <= iterative && !too_long)
+  if (std::min(dense, sparse) <= iterative)
     return {sparse < dense ? SolverKind::sparse : SolverKind::dense, counts + costs};
-  if (explicit_cg <= implicit_cg && !too_long) return {SolverKind::explicit_cg, counts + costs};
+  if (explicit_cg <= implicit_cg) return {SolverKind::explicit_cg, counts + costs};
   return {SolverKind::implicit_cg, counts + costs};
 }
 

@@ -256,6 +256,10 @@ TEST(OverlongTrack, IsSolvedOrRefusedNeverMiscounted) {
             << s.error().what();
         continue;
       }
+      if (c.solver == CameraSolverKind::automatic && !held) {
+        EXPECT_EQ(s.value().solver, "iterative-implicit");
+        EXPECT_NE(s.value().solver_reason.find("too often"), std::string::npos);
+      }
       EXPECT_LT(scaled_gradient(problem, options.fixed, 5),
                 1e-3 * scaled_gradient(start, options.fixed, 5));
     }
