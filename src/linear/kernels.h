@@ -68,20 +68,6 @@ struct EliminateOutput {
   double* weights = nullptr;  ///< rho'(|r|^2), 8 per batch; not written without a loss
 };
 
-struct TrialInput {
-  const Batches* batches;
-  const double* cameras;        ///< held state, with the step
-  const double* trial_cameras;  ///< stepped
-  const double* points;
-  const double* factors;
-  bool count_newly_behind;
-  int inner_iterations;  ///< at most, of each point
-  double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
-  ScaledLoss loss{};
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
-  ChartRules chart{};               ///< as in elimination; ChartBase::none where points are held
-};
-
 /// Once the cameras have stepped and the points followed by back-substitution, each point takes
 /// Gauss-Newton steps by itself, its cameras held: cheap, and what the linear model got wrong about
 /// the point is mended before the cost is judged ("embedded point iterations": Jeong, Nister,
@@ -101,10 +87,33 @@ constexpr double kDamping = 0.3;
 constexpr double kLost = 1e4;
 }  // namespace inner_iterations
 
+/// The step of a point: `newton` times what back-substitution gives and `descent` times D^-1 g; of
+/// points by X, Y, Z only.
+struct PointBlend {
+  double newton = 1, descent = 0;
+  double inner_damping = inner_iterations::kDamping;
+  bool plain() const { return newton == 1 && descent == 0; }
+};
+
+struct TrialInput {
+  const Batches* batches;
+  const double* cameras;        ///< held state, with the step
+  const double* trial_cameras;  ///< stepped
+  const double* points;
+  const double* factors;
+  bool count_newly_behind;
+  int inner_iterations;  ///< at most, of each point
+  double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
+  ScaledLoss loss{};
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  ChartRules chart{};               ///< as in elimination; ChartBase::none where points are held
+  PointBlend blend{};
+};
+
 struct TrialOutput {
   double* points;              ///< stepped
   double square_sum;           ///< sum |r|^2 at the stepped state
-  double damping_term;         ///< sum d^T D d over points
+  double damping_term;         ///< sum d^T D d over points, d as back-substituted
   double step2_max;            ///< largest |d|^2 / |X|^2 of a point, or chart_step2
   std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
   double loss_sum = 0;         ///< sum rho(|r|^2) there; not summed without a loss

@@ -10,6 +10,16 @@
 namespace sheaf {
 namespace {
 
+Vector3<double> blended(const PointBlend& blend, const double* factor, const Vector3<double>& d) {
+  if (blend.plain()) return d;
+  const auto at = [&](int i) { return factor[8 * i]; };
+  const Vector3<double> g{at(6) / at(0), at(1) * at(6) + at(7) / at(3),
+                          at(2) * at(6) + at(4) * at(7) + at(8) / at(5)};
+  Vector3<double> step;
+  for (int i = 0; i < 3; ++i) step[i] = blend.newton * d[i] + blend.descent * g[i] / at(9 + i);
+  return step;
+}
+
 struct PointCost {
   double square = 0, cost = 0;
   Matrix3<double> V{};
@@ -49,7 +59,7 @@ PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::u
   for (int step = 0; step < in.inner_iterations; ++step) {
     const PointCoordinates at(in.chart, base, X);
     Matrix3<double> A = best.V;
-    at.damp(D, inner_iterations::kDamping, A);
+    at.damp(D, in.blend.inner_damping, A);
     const Factor3 f = Factor3::of(A);
     const Vector3<double> w = f.forward(best.g.data());
     const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
@@ -80,7 +90,7 @@ void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialO
   const PointCoordinates at(in.chart, base_of(in.chart, batches, group, lane, in.cameras), X);
   const Vector3<double> moved = base_of(in.chart, batches, group, lane, in.trial_cameras);
   const Vector3<double> q = at.of(d);
-  Vector3<double> Y = real ? at.step(d, moved) : X;
+  Vector3<double> Y = real ? at.step(blended(in.blend, factor, d), moved) : X;
   const Vector3<double> stay =
       at.step({moved[0] - at.base[0], moved[1] - at.base[1], moved[2] - at.base[2]}, moved);
   const PointCost cost = real ? refine_point(in, group, lane, factor, moved, stay, Y) : PointCost();

@@ -110,6 +110,23 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   return sum;
 }
 
+/// gradient = L w = -Jp^T r, and lambda D^-1 of it.
+HWY_INLINE void descend_point(const double* pd, V lambda, V* gradient, V* step) {
+  const Factor f = load_factor(pd);
+  const V w0 = load(pd + 48), w1 = load(pd + 56), w2 = load(pd + 64);
+  gradient[0] = hn::Div(w0, f.i00);
+  gradient[1] = fma(f.l10, w0, hn::Div(w1, f.i11));
+  gradient[2] = fma(f.l20, w0, fma(f.l21, w1, hn::Div(w2, f.i22)));
+  for (int i = 0; i < 3; ++i)
+    step[i] = hn::Div(hn::Mul(lambda, gradient[i]), load(pd + 8 * (9 + i)));
+}
+
+HWY_INLINE void blend_step(const PointBlend& blend, const double* pd, V* d) {
+  V gradient[3], descent[3];
+  descend_point(pd, set(blend.descent), gradient, descent);
+  for (int i = 0; i < 3; ++i) d[i] = fma(set(blend.newton), d[i], descent[i]);
+}
+
 /// Sum |r|^2 of a track, and sum rho(|r|^2): the same without a loss.
 struct TrackCost {
   V square, cost;
@@ -190,7 +207,7 @@ HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group,
   const double mean = in.mean_square * group.track;
   const V worth_one = set(inner_iterations::kWorthOne * mean);
   const V worth_more = set(inner_iterations::kWorthMore * mean);
-  const V weak = set(inner_iterations::kDamping);
+  const V weak = set(in.blend.inner_damping);
   for (int steps_left = in.inner_iterations; steps_left > 0;) {
     const Factor f =
         factor3(fma(weak, load(pd + 72), p.v00), p.v01, p.v02, fma(weak, load(pd + 80), p.v11),
@@ -295,6 +312,7 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   if (group.lanes < 8)  // masked lanes stay where they are
     for (V& x : s) x = hn::Mul(x, mask);
   V damping = back_substitute(pd, s, d);
+  if (!in.blend.plain()) blend_step(in.blend, pd, d);
   Refined y{hn::Add(X[0], d[0]), hn::Add(X[1], d[1]), hn::Add(X[2], d[2]), {zero(), zero()}};
   [[maybe_unused]] ChartedStep charted;
   if constexpr (Charted) damping = charted.take(in, group, lane, pd, mask, X, d, y);

@@ -117,7 +117,8 @@ class KernelsTest : public ::testing::Test {
                            mean_square_,
                            loss_,
                            out.weights.data(),
-                           chart_};
+                           chart_,
+                           blend_};
     out.trial.points = out.trial_points.data();
     out.product.allocate(kProductRecord * 9);
     out.product.fill(0);
@@ -157,6 +158,7 @@ class KernelsTest : public ::testing::Test {
   Buffer<double> cameras_, trial_cameras_, points_;
   bool points_held_ = false;
   int inner_iterations_ = 3;
+  PointBlend blend_;
   double mean_square_ = 1;  ///< px^2: every point has something to gain
   ScaledLoss loss_;
   ChartRules chart_;
@@ -323,6 +325,19 @@ TEST_F(KernelsTest, InnerIterationsMatchTheReferenceAndLowerTheCost) {
       const Outcome got = run(*kernels);
       EXPECT_NEAR(got.trial.square_sum, previous, 1e-10 * previous);
       EXPECT_EQ(got.trial.damping_term, run(*kernels).trial.damping_term);
+    }
+  }
+}
+
+TEST_F(KernelsTest, StepsTowardsSteepestDescentMatchTheReference) {
+  make(false, ChunkLists::none);
+  const Outcome newton = run(reference_kernels());
+  for (const PointBlend& blend : {PointBlend{0.3, 2e-4, 1.5}, PointBlend{0, 1e-4}}) {
+    blend_ = blend;
+    for (int most : {0, 3}) {
+      inner_iterations_ = most;
+      EXPECT_NE(run(reference_kernels()).trial.square_sum, newton.trial.square_sum);
+      expect_agreement();
     }
   }
 }
