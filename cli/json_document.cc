@@ -22,6 +22,8 @@ Json iteration_json(const Iteration& it) {
           {"trial_cost", number(it.trial_cost)},
           {"accepted", it.accepted},
           {"damping", number(it.damping)},
+          {"radius", number(it.radius)},
+          {"reused", it.reused},
           {"gain_ratio", number(it.gain_ratio)},
           {"gradient_max", number(it.gradient_max)},
           {"step_norm", number(it.step_norm)},
@@ -46,6 +48,7 @@ Json options_json(const SolveArguments& a) {
           {"solver", a.solver},
           {"precision", a.precision},
           {"memory_limit_bytes", a.memory_limit_bytes},
+          {"trust_region", a.trust_region},
           {"initial_damping", a.initial_damping},
           {"inner_iterations", a.inner_iterations},
           {"simd", a.simd}};

@@ -89,6 +89,15 @@ void add_solver_options(CLI::App& verb, SolveArguments& a) {
                   "units K, M, G are powers of 1024")
       ->type_name("BYTES")
       ->transform(CLI::AsSizeValue(false));
+  verb.add_option(
+          "--trust-region", a.trust_region,
+          "what follows a rejected step: lm (more damping, everything computed again) or "
+          "dogleg (the same factorisation, a shorter step; with an iterative solver "
+          "Steihaug's, which also ends conjugate gradients at the radius; with --points xyz "
+          "only)")
+      ->type_name("NAME")
+      ->check(one_of({"lm", "dogleg"}))
+      ->capture_default_str();
   verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
       ->type_name("LAMBDA")
       ->check(number_in(0, most, true, "a number from 0 up"))
@@ -256,6 +265,7 @@ SolveOptions solve_options(const SolveArguments& a) {
   options.solver = kSolvers.at(a.solver);
   options.precision = kPrecisions.at(a.precision);
   options.memory_limit_bytes = a.memory_limit_bytes;
+  options.trust_region = a.trust_region == "dogleg" ? TrustRegion::dogleg : TrustRegion::lm;
   options.initial_damping = a.initial_damping;
   options.inner_iterations = a.inner_iterations;
   options.simd = kSimds.at(a.simd);

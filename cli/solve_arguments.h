@@ -22,6 +22,7 @@ struct SolveArguments {
   std::string solver = "auto";
   std::string precision = "auto";
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none
+  std::string trust_region = "lm";
   double initial_damping = 0;
   int inner_iterations = SolveOptions().inner_iterations;
   std::string simd = "best";

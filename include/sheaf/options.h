@@ -41,6 +41,13 @@ enum class CameraSolverKind {
   iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed
 };
 
+/// What bounds a step that the cost did not follow.
+enum class TrustRegion {
+  lm,  ///< more damping: a new linearisation and factorisation
+  /// A smaller radius: the same factorisation, a shorter step on Powell's path. Points by xyz only.
+  dogleg,
+};
+
 /// In what the camera system is solved. State, residuals, gradient and costs are always double.
 enum class Precision {
   automatic,  ///< whichever is quicker, where mixed ends where double ends
@@ -65,7 +72,8 @@ struct SolveOptions {
   /// memory that it no longer needs: a third off the peak of the largest problems. Nobody else may
   /// look at the problem meanwhile; should memory run out, it is left without observations.
   bool lend_observations = false;
-  double initial_damping = 0;  ///< 0: the default rule
+  TrustRegion trust_region = TrustRegion::lm;  ///< what follows a rejected step
+  double initial_damping = 0;                  ///< lambda of the first step; 0: the default rule
   /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras
   /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
   int inner_iterations = 3;

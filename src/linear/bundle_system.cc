@@ -74,11 +74,13 @@ BundleSystem::BundleSystem(const Problem& problem, const Batches& batches, Colum
       solver_ = make_explicit_solver(columns_, chunks_, plan.mixed, kernels, threads);
       break;
     case SolverKind::implicit_cg:
-      solver_ = make_implicit_solver(
-          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_}, plan.mixed,
-          kernels, threads);
+      solver_ = make_implicit_solver(columns_, held_state(), plan.mixed, kernels, threads);
       break;
   }
+}
+
+HeldState BundleSystem::held_state() {
+  return {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_};
 }
 
 void BundleSystem::make_coarse_space(const Plan& plan) {
@@ -146,6 +148,22 @@ void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<doub
 }
 
 Step BundleSystem::propose(const StepRequest& request) {
+  const bool reuse = only_radius_is_new(request);
+  request_ = request;
+  if (reuse) {
+    step_.reused = true;
+    step_.linear_iterations = 0;
+    shorten_newton();
+    return step_;
+  }
+  plane_.reset();
+  proposed_ = descended_ = false;
+  step_ = linearize(request);
+  proposed_ = step_.solved;
+  return step_;
+}
+
+Step BundleSystem::linearize(const StepRequest& request) {
   const std::size_t slices = chunks_.slices.size() - 1;
   const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
@@ -206,38 +224,50 @@ Step BundleSystem::collect_step(const StepRequest& request,
 }
 
 bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
+  residual_ = nullptr;
+  cut_ = false;
   if (columns_.count == 0) return true;
-  const bool corrected = coarse_ && coarse_->factor(diagonal_.data(), damping_.data());
-  const CameraSystem system{{&chunks_, tiles_.data(), diagonal_.data()},
-                            &vectors_,
-                            damping_.data(),
-                            request.forcing,
-                            request.cancelled,
-                            corrected ? coarse_.get() : nullptr,
-                            request.precise};
-  const CameraSolution solution = solver_->solve(system, camera_step_);
+  corrected_ = coarse_ && coarse_->factor(diagonal_.data(), damping_.data());
+  const CameraSolution solution = solver_->solve(camera_system(request), camera_step_);
+  ++camera_solves_;
   step.linear_iterations = solution.iterations;
+  residual_ = solution.residual;
+  cut_ = solution.cut;
   return solution.solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
                                         [](double x) { return std::isfinite(x); });
 }
 
-/// Steps every camera; returns the largest relative change of a block: radians for rotations,
-/// relative to its length for translations and focal lengths, absolute for the distortion (it
-/// stands beside 1).
-double BundleSystem::step_cameras() {
+CameraSystem BundleSystem::camera_system(const StepRequest& request) const {
+  return {{&chunks_, tiles_.data(), diagonal_.data()},
+          &vectors_,
+          damping_.data(),
+          request.forcing,
+          request.cancelled,
+          corrected_ ? coarse_.get() : nullptr,
+          request.precise,
+          request.radius,
+          request.damping,
+          request.dogleg};
+}
+
+/// Steps every camera by these columns; returns the largest relative change of a block: radians for
+/// rotations, relative to its length for translations and focal lengths, absolute for the
+/// distortion (it stands beside 1). The records keep the step that was solved for: points follow it
+/// by back-substitution.
+double BundleSystem::step_cameras(const Buffer<double>& columns) {
   double largest = 0;
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const std::int32_t* c = columns_.image(i);
-    std::array<double, 9> d{};
+    std::array<double, 9> d{}, newton{};
     for (int k = 0; k < 9; ++k)
-      if (c[k] >= 0) d[k] = camera_step_[c[k]];
+      if (c[k] >= 0) d[k] = columns[c[k]], newton[k] = camera_step_[c[k]];
     const RigidMotion<double>& pose = poses_[i];
     if (c[0] >= 0) trial_poses_[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
     const std::uint32_t lens = image_camera_[i];
     const auto& k = lenses_[lens];
     for (int j = 0; j < 3; ++j)
       if (c[6 + j] >= 0) trial_lenses_[lens][j] = k[j] + d[6 + j];
-    camera_record::write_step(k.data(), d.data(),
+    camera_record::write_step(k.data(), newton.data(),
                               &cameras_[kCameraRecord * i + camera_record::kStep]);
     write_camera_record(i, trial_poses_[i], trial_lenses_[lens].data(), trial_cameras_.data());
     const auto norm = [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); };
@@ -250,9 +280,15 @@ double BundleSystem::step_cameras() {
   return largest;
 }
 
-Trial BundleSystem::trial() {
+Trial BundleSystem::try_step(const DoglegStep& step) {
   Trial out;
-  out.step_norm = step_cameras();
+  out.step_norm = step_cameras(blend_cameras(step));
+  PointBlend blend;
+  if (plane_ && !rules_.held) {
+    blend.newton = step.newton;
+    blend.descent = step.descent * request_.damping;
+    blend.inner_damping *= std::max(1.0, damping_of(*plane_, step) / request_.damping);
+  }
   const std::size_t slices = chunks_.slices.size() - 1;
   const TrialInput in{&batches_,
                       cameras_.data(),
@@ -264,7 +300,8 @@ Trial BundleSystem::trial() {
                       mean_square_,
                       loss_,
                       weights_.data(),
-                      chart_};
+                      chart_,
+                      blend};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};
@@ -272,10 +309,12 @@ Trial BundleSystem::trial() {
       kernels_.trial(in, chunks_.chunks[c], outputs[s]);
   });
   double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
+  newton_damping_ = 0;
   for (const TrialOutput& o : outputs) {
     square_sum += o.square_sum;
     loss_sum += o.loss_sum;
     decrease += o.damping_term;
+    newton_damping_ += o.damping_term;
     step2 = std::max(step2, o.step2_max);
     out.newly_behind += o.newly_behind;
   }
@@ -298,6 +337,7 @@ void BundleSystem::accept() {
   std::swap(lenses_, trial_lenses_);
   std::swap(cameras_, trial_cameras_);
   std::swap(points_, trial_points_);
+  proposed_ = false;
 }
 
 void BundleSystem::store(Problem& problem) const {
@@ -363,6 +403,7 @@ std::uint64_t BundleSystem::bytes() const {
   sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
          factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
   sum += weights_.bytes() + scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
+  if (passes_) sum += passes_->bytes();
   return sum + solver_->bytes() + (coarse_ ? coarse_->bytes() : 0);
 }
 

@@ -9,6 +9,7 @@
 #include "linear/coarse_space.h"
 #include "linear/kernels.h"
 #include "linear/sparse_cholesky.h"
+#include "linear/steihaug_path.h"
 #include "platform/pages.h"
 
 namespace sheaf {
@@ -85,6 +86,14 @@ void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, 
   sum.add(c.images, 8 * kCoarseBasis);
 }
 
+/// What the first rejected step of a dogleg takes.
+void add_dogleg(const WorkCounts& c, SolverKind kind, std::uint64_t slices, Footprint& sum) {
+  sum.add(slices * c.images, 8 * kProductRecord);
+  sum.add(c.columns, 8, 2);
+  if (kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg)
+    sum.add(SteihaugPath::most_bytes(c.columns), 1);
+}
+
 /// Pairs looked at in one sample, and worth sampling for.
 constexpr std::uint64_t kWorthCounting = 500000;
 
@@ -122,6 +131,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
   }
   if (kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg)
     add_iterative(c, plan, slices, sum);
+  if (c.dogleg) add_dogleg(c, kind, slices, sum);
   if (kind == SolverKind::blocks) sum.add(c.images, 81 * 8 + 76);
   return sum.bytes();
 }

@@ -59,6 +59,9 @@ class ImplicitSolver : public CameraSolver {
     ImageOperator& S = round ? static_cast<ImageOperator&>(*rounded_) : operator_;
     return cg_.run(S, Preconditioner{blocks_, system.coarse}, system, x);
   }
+  CameraSolution shorten(const CameraSystem& system, Buffer<double>& x) override {
+    return cg_.shorten(system, x);
+  }
   std::uint64_t bytes() const override {
     return sums_.bytes() + (rounded_ ? rounded_->bytes() : 0) + blocks_.bytes() + cg_.bytes();
   }

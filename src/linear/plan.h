@@ -34,6 +34,7 @@ struct WorkCounts {
   bool lens_shared = false;
   bool images_couple = true;  ///< some free point or shared lens couples images
   bool weighted = false;      ///< a loss leaves a weight for each observation
+  bool dogleg = false;        ///< the gradient is summed by image, steps are blended
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;

@@ -68,6 +68,8 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (!(options.time_limit_s >= 0)) return usage("time_limit_s is negative or not a number");
   if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
   if (options.threads < 0) return usage("threads is negative");
+  if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz)
+    return usage("the dogleg steps points by X, Y, Z: it takes no other parametrisation of points");
   const Loss& loss = options.loss;
   if (!(loss.scale_px >= 0 && std::isfinite(loss.scale_px)))
     return usage("the scale of the loss is negative or not finite");
@@ -124,6 +126,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
   Clusters clusters;
   WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
   counts.weighted = options.loss.kind != LossKind::none;
+  counts.dogleg = options.trust_region == TrustRegion::dogleg;
   const bool lends = lends_observations(problem, batches, options, threads);
   const std::uint64_t lent_bytes = lends ? LentObservations::bytes(problem) : 0;
   Result<Choice> choice = choose_solver(counts, options, threads.count(),

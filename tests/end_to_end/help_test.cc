@@ -36,7 +36,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
                     "--loss", "--cheirality", "--points", "--fix", "--solver", "--memory-limit",
-                    "--initial-damping", "--inner-iterations", "--simd", "--precision"});
+                    "--trust-region", "--initial-damping", "--inner-iterations", "--simd",
+                    "--precision"});
   return options;
 }
 

@@ -170,6 +170,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                  "double",
                  "--initial-damping",
                  "0.01",
+                 "--trust-region",
+                 "dogleg",
                  "--time-limit",
                  "60"})
                 .exit_code,
@@ -185,6 +187,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"precision", "double"},
                                 {"solver", "dense"},
                                 {"memory_limit_bytes", 0},
+                                {"trust_region", "dogleg"},
                                 {"initial_damping", 0.01},
                                 {"inner_iterations", 3},
                                 {"simd", "best"}}));
@@ -207,6 +210,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
     }
   }
   EXPECT_EQ(iterations[1]["damping"], 0.01);
+  EXPECT_EQ(iterations[1]["radius"], nullptr);
+  EXPECT_EQ(iterations[1]["reused"], false);
   const double total = s["time"]["total_s"];
   EXPECT_GE(total, s["time"]["solve_s"].get<double>() + s["time"]["setup_s"].get<double>());
 }
