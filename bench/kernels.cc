@@ -181,16 +181,18 @@ void cholesky(benchmark::State& state, const Kernels* kernels) {
   report_flops(state, m * m * m / 3 + 2 * m * m);
 }
 
-BundleSystem make_system(const Problem& problem, const Kernels& kernels, Threads& threads) {
-  return BundleSystem(problem, arrange(problem), number_columns(problem, {}),
-                      PointRules{false, false, 3}, {SolverKind::dense}, kernels, threads);
+BundleSystem make_system(const Problem& problem, const Batches& batches, const Kernels& kernels,
+                         Threads& threads) {
+  return BundleSystem(problem, batches, number_columns(problem, {}), PointRules{false, false, 3},
+                      {SolverKind::dense}, kernels, threads);
 }
 
 void setup(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(1);
   for (auto _ : state) {
-    BundleSystem system = make_system(problem, *kernels, threads);
+    const Batches batches = arrange(problem, {}, threads);
+    BundleSystem system = make_system(problem, batches, *kernels, threads);
     benchmark::DoNotOptimize(system.bytes());
   }
 }
@@ -204,7 +206,8 @@ void arrange_only(benchmark::State& state) {
 void step(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(static_cast<int>(state.range(0)));
-  BundleSystem system = make_system(problem, *kernels, threads);
+  const Batches batches = arrange(problem, {}, threads);
+  BundleSystem system = make_system(problem, batches, *kernels, threads);
   for (auto _ : state) {
     benchmark::DoNotOptimize(system.propose({1e-4}).cost);
     benchmark::DoNotOptimize(system.trial().cost);

@@ -76,6 +76,7 @@ int run(const Arguments& arguments) {
   Progress progress(arguments.common.quiet);
   SolveOptions options = solve_options(arguments.solve);
   options.threads = arguments.common.threads;
+  options.lend_observations = true;
   options.stop = interrupt.token();
   options.on_plan = [&](const Summary& summary) { progress.report_plan(summary); };
   options.on_iteration = [&](const Iteration& iteration) {

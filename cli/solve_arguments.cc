@@ -21,6 +21,10 @@ namespace {
 const std::map<std::string, Cheirality> kCheiralities = {{"formula", Cheirality::formula},
                                                          {"reject", Cheirality::reject},
                                                          {"hold-out", Cheirality::hold_out}};
+const std::map<std::string, PointParametrisation> kParametrisations = {
+    {"xyz", PointParametrisation::xyz},
+    {"homogeneous", PointParametrisation::homogeneous},
+    {"inverse-depth", PointParametrisation::inverse_depth}};
 const std::map<std::string, CameraSolverKind> kSolvers = {
     {"auto", CameraSolverKind::automatic},
     {"dense", CameraSolverKind::dense},
@@ -85,6 +89,15 @@ void add_solver_options(CLI::App& verb, SolveArguments& a) {
                   "units K, M, G are powers of 1024")
       ->type_name("BYTES")
       ->transform(CLI::AsSizeValue(false));
+  verb.add_option(
+          "--trust-region", a.trust_region,
+          "what follows a rejected step: lm (more damping, everything computed again) or "
+          "dogleg (the same factorisation, a shorter step; with an iterative solver "
+          "Steihaug's, which also ends conjugate gradients at the radius; with --points xyz "
+          "only)")
+      ->type_name("NAME")
+      ->check(one_of({"lm", "dogleg"}))
+      ->capture_default_str();
   verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
       ->type_name("LAMBDA")
       ->check(number_in(0, most, true, "a number from 0 up"))
@@ -192,6 +205,13 @@ void add_model_options(CLI::App& verb, SolveArguments& a) {
       ->type_name("RULE")
       ->check(one_of({"formula", "reject", "hold-out"}))
       ->capture_default_str();
+  verb.add_option("--points", a.points,
+                  "the coordinates in which a point steps: xyz, homogeneous (a unit 4-vector) or "
+                  "inverse-depth (bearing and inverse depth from the first image that sees it); "
+                  "the last two pass through infinity")
+      ->type_name("NAME")
+      ->check(one_of({"xyz", "homogeneous", "inverse-depth"}))
+      ->capture_default_str();
   verb.add_option(
           "--fix", a.fix,
           "hold these to the last bit: a comma-separated list of points, poses, intrinsics, "
@@ -241,9 +261,11 @@ SolveOptions solve_options(const SolveArguments& a) {
   parse_loss(a.loss, options.loss);
   options.cheirality = kCheiralities.at(a.cheirality);
   if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
+  options.points = kParametrisations.at(a.points);
   options.solver = kSolvers.at(a.solver);
   options.precision = kPrecisions.at(a.precision);
   options.memory_limit_bytes = a.memory_limit_bytes;
+  options.trust_region = a.trust_region == "dogleg" ? TrustRegion::dogleg : TrustRegion::lm;
   options.initial_damping = a.initial_damping;
   options.inner_iterations = a.inner_iterations;
   options.simd = kSimds.at(a.simd);

@@ -17,10 +17,12 @@ struct SolveArguments {
   double time_limit_s = 0;  ///< 0: none
   std::string loss = "none";
   std::string cheirality = "formula";
+  std::string points = "xyz";
   std::string fix;
   std::string solver = "auto";
   std::string precision = "auto";
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none
+  std::string trust_region = "lm";
   double initial_damping = 0;
   int inner_iterations = SolveOptions().inner_iterations;
   std::string simd = "best";

@@ -21,6 +21,13 @@ enum class Cheirality {
   hold_out,  ///< those behind at the start are left out (and listed); then as reject
 };
 
+/// In which coordinates a point steps. It is stored as X, Y, Z in any case.
+enum class PointParametrisation {
+  xyz,            ///< X, Y, Z
+  homogeneous,    ///< a unit 4-vector about the middle of the cameras: passes through infinity
+  inverse_depth,  ///< bearing and inverse depth from the first image that sees it: likewise
+};
+
 /// Instruction set of the hot kernels.
 enum class Simd { best, scalar, sse4, avx2, avx512 };
 
@@ -32,6 +39,13 @@ enum class CameraSolverKind {
   iterative,           ///< conjugate gradients, explicit or implicit by counted flops and bytes
   iterative_explicit,  ///< conjugate gradients on the formed blocks
   iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed
+};
+
+/// What bounds a step that the cost did not follow.
+enum class TrustRegion {
+  lm,  ///< more damping: a new linearisation and factorisation
+  /// A smaller radius: the same factorisation, a shorter step on Powell's path. Points by xyz only.
+  dogleg,
 };
 
 /// In what the camera system is solved. State, residuals, gradient and costs are always double.
@@ -49,11 +63,17 @@ struct SolveOptions {
   Loss loss{};                                                    ///< none, or as in `Huber{1.0}`
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
+  PointParametrisation points = PointParametrisation::xyz;
   Fixed fixed{};
   CameraSolverKind solver = CameraSolverKind::automatic;
   Precision precision = Precision::automatic;
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
-  double initial_damping = 0;            ///< 0: the default rule
+  /// The solver may free the problem's observations while it runs and put them back at the end, in
+  /// memory that it no longer needs: a third off the peak of the largest problems. Nobody else may
+  /// look at the problem meanwhile; should memory run out, it is left without observations.
+  bool lend_observations = false;
+  TrustRegion trust_region = TrustRegion::lm;  ///< what follows a rejected step
+  double initial_damping = 0;                  ///< lambda of the first step; 0: the default rule
   /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras
   /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
   int inner_iterations = 3;

@@ -19,6 +19,8 @@ struct Iteration {
   double trial_cost = 0;  ///< of the state tried; may be infinite or NaN
   bool accepted = true;
   double damping = 0;       ///< lambda the step was computed with
+  double radius = 0;        ///< px: of the step in the metric of diag(J^T J); infinite: none (lm)
+  bool reused = false;      ///< dogleg after a rejection: nothing was linearised or factored anew
   double gain_ratio = 0;    ///< actual / predicted decrease
   double gradient_max = 0;  ///< px; largest |J_i^T r| / |J_i| over the free columns, at the state
                             ///< the step starts from, points eliminated

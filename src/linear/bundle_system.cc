@@ -4,13 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
+#include "linear/scaling.h"
 #include "linear/slices.h"
 
 namespace sheaf {
 
 namespace {
+
+constexpr std::size_t kGroupsPerTask = 1024;
+/// Of the units that the linear system's products with points are computed in.
+constexpr double kRounding = 1.1e-16, kFloatRounding = 6e-8;
 
 /// Points that are held couple no images: no pairs. Lists number records with 16 bits, too few for
 /// the longest tracks: sums then run over the records in their own order.
@@ -32,17 +38,19 @@ ChunkLists lists_for(SolverKind kind, bool points_held, std::uint32_t longest_tr
 
 }  // namespace
 
-BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns columns,
+BundleSystem::BundleSystem(const Problem& problem, const Batches& batches, Columns columns,
                            const PointRules& rules, const Plan& plan, const Kernels& kernels,
                            Threads& threads)
     : rules_(rules),
+      float_products_(plan.mixed && plan.kind == SolverKind::implicit_cg),
       kernels_(kernels),
       threads_(threads),
-      batches_(std::move(batches)),
+      batches_(batches),
       chunks_(cut_into_chunks(batches_, static_cast<std::uint32_t>(problem.num_images()),
-                              lists_for(plan.kind, rules.held, batches_.longest_track))),
+                              lists_for(plan.kind, rules.held, batches_.longest_track), threads)),
       columns_(std::move(columns)) {
   fill_state(problem);
+  place_charts();
   const std::size_t slices = chunks_.slices.size() - 1;
   factors_.allocate(kFactorGroup * batches_.groups.size());
   tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
@@ -51,7 +59,7 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
   const std::size_t padded = (static_cast<std::size_t>(columns_.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   camera_step_.allocate(padded);
-  make_coarse_space(plan.kind);
+  make_coarse_space(plan);
   switch (plan.kind) {
     case SolverKind::blocks:
       solver_ = make_block_solver(columns_, threads);
@@ -66,18 +74,20 @@ BundleSystem::BundleSystem(const Problem& problem, Batches batches, Columns colu
       solver_ = make_explicit_solver(columns_, chunks_, plan.mixed, kernels, threads);
       break;
     case SolverKind::implicit_cg:
-      solver_ = make_implicit_solver(
-          columns_, {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_}, plan.mixed,
-          kernels, threads);
+      solver_ = make_implicit_solver(columns_, held_state(), plan.mixed, kernels, threads);
       break;
   }
 }
 
-void BundleSystem::make_coarse_space(SolverKind kind) {
-  if (rules_.held || (kind != SolverKind::explicit_cg && kind != SolverKind::implicit_cg)) return;
-  Clusters clusters = coarse_clusters(batches_, columns_);
-  if (clusters.count > 0)
-    coarse_ = std::make_unique<CoarseSpace>(batches_, columns_, std::move(clusters),
+HeldState BundleSystem::held_state() {
+  return {&batches_, &chunks_, &cameras_, &points_, &factors_, &weights_};
+}
+
+void BundleSystem::make_coarse_space(const Plan& plan) {
+  const bool iterates =
+      plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
+  if (!rules_.held && iterates && plan.clusters.count > 0)
+    coarse_ = std::make_unique<CoarseSpace>(batches_, columns_, plan.clusters,
                                             chunks_.slices.size() - 1, kernels_, threads_);
 }
 
@@ -95,11 +105,36 @@ void BundleSystem::fill_state(const Problem& problem) {
     write_camera_record(i, poses_[i], lenses_[image_camera_[i]].data(), cameras_.data());
   points_.allocate(kPointGroup * batches_.groups.size());
   trial_points_.allocate(points_.size());
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (int l = 0; l < 8; ++l) {
-      const double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
-      for (int d = 0; d < 3; ++d) points_[kPointGroup * g + 8 * d + l] = X[d];
-    }
+  threads_.for_ranges(batches_.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (int l = 0; l < 8; ++l) {
+        const double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+        for (int d = 0; d < 3; ++d) points_[kPointGroup * g + 8 * d + l] = X[d];
+      }
+  });
+}
+
+/// Homogeneous points are about the mean camera centre, in units of the cameras' mean distance from
+/// it, so that neither the place of the scene nor its unit matters. Points that are held have no
+/// charts: nothing of them may move.
+void BundleSystem::place_charts() {
+  if (rules_.held || rules_.charts == ChartBase::none) return;
+  const std::size_t images = poses_.size();
+  const auto centre = [&](std::size_t image, int k) {
+    const double *R = &cameras_[kCameraRecord * image], *t = R + camera_record::kTranslation;
+    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  };
+  chart_.base = rules_.charts;
+  chart_.crosses = !rules_.watch_behind;
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < images; ++i) chart_.origin[k] += centre(i, k);
+    chart_.origin[k] /= static_cast<double>(images);
+  }
+  double length = 0;
+  for (std::size_t i = 0; i < images; ++i)
+    length += std::hypot(centre(i, 0) - chart_.origin[0], centre(i, 1) - chart_.origin[1],
+                         centre(i, 2) - chart_.origin[2]);
+  chart_.unit = towards_one(length / static_cast<double>(images));
 }
 
 void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<double>& pose,
@@ -113,14 +148,31 @@ void BundleSystem::write_camera_record(std::size_t image, const RigidMotion<doub
 }
 
 Step BundleSystem::propose(const StepRequest& request) {
+  const bool reuse = only_radius_is_new(request);
+  request_ = request;
+  if (reuse) {
+    step_.reused = true;
+    step_.linear_iterations = 0;
+    shorten_newton();
+    return step_;
+  }
+  plane_.reset();
+  proposed_ = descended_ = false;
+  step_ = linearize(request);
+  proposed_ = step_.solved;
+  return step_;
+}
+
+Step BundleSystem::linearize(const StepRequest& request) {
   const std::size_t slices = chunks_.slices.size() - 1;
   const std::size_t tile_doubles = kTileDoubles * chunks_.tiles.size();
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
   loss_ = request.loss;
   const std::size_t weights = loss_.kind == LossKind::none ? 0 : 8 * batches_.num_batches();
   if (weights_.size() != weights) weights_.allocate(weights);
-  const EliminateInput in{&batches_,   &chunks_, cameras_.data(), points_.data(), request.damping,
-                          rules_.held, loss_};
+  chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
+  const EliminateInput in{&batches_,       &chunks_,    cameras_.data(), points_.data(),
+                          request.damping, rules_.held, loss_,           chart_};
   if (coarse_) coarse_->place(cameras_.data());
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
@@ -172,38 +224,50 @@ Step BundleSystem::collect_step(const StepRequest& request,
 }
 
 bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
+  residual_ = nullptr;
+  cut_ = false;
   if (columns_.count == 0) return true;
-  const bool corrected = coarse_ && coarse_->factor(diagonal_.data(), damping_.data());
-  const CameraSystem system{{&chunks_, tiles_.data(), diagonal_.data()},
-                            &vectors_,
-                            damping_.data(),
-                            request.forcing,
-                            request.cancelled,
-                            corrected ? coarse_.get() : nullptr,
-                            request.precise};
-  const CameraSolution solution = solver_->solve(system, camera_step_);
+  corrected_ = coarse_ && coarse_->factor(diagonal_.data(), damping_.data());
+  const CameraSolution solution = solver_->solve(camera_system(request), camera_step_);
+  ++camera_solves_;
   step.linear_iterations = solution.iterations;
+  residual_ = solution.residual;
+  cut_ = solution.cut;
   return solution.solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
                                         [](double x) { return std::isfinite(x); });
 }
 
-/// Steps every camera; returns the largest relative change of a block: radians for rotations,
-/// relative to its length for translations and focal lengths, absolute for the distortion (it
-/// stands beside 1).
-double BundleSystem::step_cameras() {
+CameraSystem BundleSystem::camera_system(const StepRequest& request) const {
+  return {{&chunks_, tiles_.data(), diagonal_.data()},
+          &vectors_,
+          damping_.data(),
+          request.forcing,
+          request.cancelled,
+          corrected_ ? coarse_.get() : nullptr,
+          request.precise,
+          request.radius,
+          request.damping,
+          request.dogleg};
+}
+
+/// Steps every camera by these columns; returns the largest relative change of a block: radians for
+/// rotations, relative to its length for translations and focal lengths, absolute for the
+/// distortion (it stands beside 1). The records keep the step that was solved for: points follow it
+/// by back-substitution.
+double BundleSystem::step_cameras(const Buffer<double>& columns) {
   double largest = 0;
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const std::int32_t* c = columns_.image(i);
-    std::array<double, 9> d{};
+    std::array<double, 9> d{}, newton{};
     for (int k = 0; k < 9; ++k)
-      if (c[k] >= 0) d[k] = camera_step_[c[k]];
+      if (c[k] >= 0) d[k] = columns[c[k]], newton[k] = camera_step_[c[k]];
     const RigidMotion<double>& pose = poses_[i];
     if (c[0] >= 0) trial_poses_[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
     const std::uint32_t lens = image_camera_[i];
     const auto& k = lenses_[lens];
     for (int j = 0; j < 3; ++j)
       if (c[6 + j] >= 0) trial_lenses_[lens][j] = k[j] + d[6 + j];
-    camera_record::write_step(k.data(), d.data(),
+    camera_record::write_step(k.data(), newton.data(),
                               &cameras_[kCameraRecord * i + camera_record::kStep]);
     write_camera_record(i, trial_poses_[i], trial_lenses_[lens].data(), trial_cameras_.data());
     const auto norm = [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); };
@@ -216,9 +280,15 @@ double BundleSystem::step_cameras() {
   return largest;
 }
 
-Trial BundleSystem::trial() {
+Trial BundleSystem::try_step(const DoglegStep& step) {
   Trial out;
-  out.step_norm = step_cameras();
+  out.step_norm = step_cameras(blend_cameras(step));
+  PointBlend blend;
+  if (plane_ && !rules_.held) {
+    blend.newton = step.newton;
+    blend.descent = step.descent * request_.damping;
+    blend.inner_damping *= std::max(1.0, damping_of(*plane_, step) / request_.damping);
+  }
   const std::size_t slices = chunks_.slices.size() - 1;
   const TrialInput in{&batches_,
                       cameras_.data(),
@@ -229,7 +299,9 @@ Trial BundleSystem::trial() {
                       rules_.held ? 0 : rules_.inner_iterations,
                       mean_square_,
                       loss_,
-                      weights_.data()};
+                      weights_.data(),
+                      chart_,
+                      blend};
   std::vector<TrialOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     outputs[s] = {trial_points_.data(), 0, 0, 0, 0};
@@ -237,10 +309,12 @@ Trial BundleSystem::trial() {
       kernels_.trial(in, chunks_.chunks[c], outputs[s]);
   });
   double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
+  newton_damping_ = 0;
   for (const TrialOutput& o : outputs) {
     square_sum += o.square_sum;
     loss_sum += o.loss_sum;
     decrease += o.damping_term;
+    newton_damping_ += o.damping_term;
     step2 = std::max(step2, o.step2_max);
     out.newly_behind += o.newly_behind;
   }
@@ -263,6 +337,7 @@ void BundleSystem::accept() {
   std::swap(lenses_, trial_lenses_);
   std::swap(cameras_, trial_cameras_);
   std::swap(points_, trial_points_);
+  proposed_ = false;
 }
 
 void BundleSystem::store(Problem& problem) const {
@@ -271,11 +346,13 @@ void BundleSystem::store(Problem& problem) const {
     problem.poses[i].translation = poses_[i].translation;
   }
   for (std::size_t i = 0; i < lenses_.size(); ++i) problem.cameras[i].parameters = lenses_[i];
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {
-      double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
-      for (int d = 0; d < 3; ++d) X[d] = points_[kPointGroup * g + 8 * d + l];
-    }
+  threads_.for_ranges(batches_.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {
+        double* X = &problem.points[3 * std::size_t(batches_.lane_point[8 * g + l])];
+        for (int d = 0; d < 3; ++d) X[d] = points_[kPointGroup * g + 8 * d + l];
+      }
+  });
 }
 
 double BundleSystem::residual_scale(double quantile) {
@@ -307,10 +384,14 @@ DigitCounts BundleSystem::count_residuals(const QuantileSearch& search) {
 }
 
 std::uint64_t BundleSystem::count_behind() {
-  std::uint64_t count = 0;
-  for (const Chunk& chunk : chunks_.chunks)
-    count += kernels_.count_behind(batches_, cameras_.data(), points_.data(), chunk);
-  return count;
+  const std::size_t slices = chunks_.slices.size() - 1;
+  std::vector<std::uint64_t> counts(slices, 0);
+  threads_.for_each(slices, [&](std::size_t s) {
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      counts[s] +=
+          kernels_.count_behind(batches_, cameras_.data(), points_.data(), chunks_.chunks[c]);
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
 }
 
 std::uint64_t BundleSystem::bytes() const {
@@ -322,6 +403,7 @@ std::uint64_t BundleSystem::bytes() const {
   sum += cameras_.bytes() + trial_cameras_.bytes() + points_.bytes() + trial_points_.bytes() +
          factors_.bytes() + tiles_.bytes() + diagonal_.bytes();
   sum += weights_.bytes() + scratch_.size() * 8 * scratch_doubles(batches_, chunks_);
+  if (passes_) sum += passes_->bytes();
   return sum + solver_->bytes() + (coarse_ ? coarse_->bytes() : 0);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "geometry/rigid_motion.h"
@@ -10,6 +11,8 @@
 #include "linear/chunks.h"
 #include "linear/coarse_space.h"
 #include "linear/columns.h"
+#include "linear/dogleg.h"
+#include "linear/dogleg_passes.h"
 #include "linear/kernels.h"
 #include "linear/plan.h"
 #include "linear/quantile.h"
@@ -26,16 +29,17 @@ struct PointRules {
   bool held = false;
   /// Count in each trial the observations that newly go behind their camera.
   bool watch_behind = false;
-  int inner_iterations = 0;  ///< of each point by itself, once the cameras have stepped
+  int inner_iterations = 0;            ///< of each point by itself, once the cameras have stepped
+  ChartBase charts = ChartBase::none;  ///< what their local coordinates are about
 };
 
 /// Reprojection rows on CPU threads. The order of every sum is fixed by the problem: chunks within
 /// a slice in order, slices in order; so the bytes do not depend on the number of threads.
 class BundleSystem : public System {
  public:
-  /// Throws std::bad_alloc.
-  BundleSystem(const Problem& problem, Batches batches, Columns columns, const PointRules& rules,
-               const Plan& plan, const Kernels& kernels, Threads& threads);
+  /// The batches must outlive it. Throws std::bad_alloc.
+  BundleSystem(const Problem& problem, const Batches& batches, Columns columns,
+               const PointRules& rules, const Plan& plan, const Kernels& kernels, Threads& threads);
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;
@@ -47,22 +51,37 @@ class BundleSystem : public System {
   /// Observations behind their camera at the held state.
   std::uint64_t count_behind();
   std::uint64_t bytes() const;
+  /// How often the camera system was solved so far.
+  std::uint64_t camera_solves() const { return camera_solves_; }
 
  private:
   void fill_state(const Problem& problem);
   void write_camera_record(std::size_t image, const RigidMotion<double>& pose,
                            const double* parameters, double* records);
-  void make_coarse_space(SolverKind kind);
+  void make_coarse_space(const Plan& plan);
+  void place_charts();
+  HeldState held_state();
+  Step linearize(const StepRequest& request);
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool solve_cameras(const StepRequest& request, Step& step);
-  double step_cameras();
+  CameraSystem camera_system(const StepRequest& request) const;
+  void shorten_newton();
+  DoglegPasses& passes();
+  bool only_radius_is_new(const StepRequest& request) const;
+  Trial try_step(const DoglegStep& step);
+  double step_cameras(const Buffer<double>& columns);
+  const Buffer<double>& blend_cameras(const DoglegStep& step);
+  void measure_newton();
+  void measure_descent();
+  double dot(const Buffer<double>& a, const double* b) const;
   DigitCounts count_residuals(const QuantileSearch& search);
   double cost_of(double square_sum, double loss_sum) const;
 
   const PointRules rules_;
+  const bool float_products_;  ///< until StepRequest::precise
   const Kernels& kernels_;
   Threads& threads_;
-  Batches batches_;
+  const Batches& batches_;
   Chunks chunks_;
   Columns columns_;
 
@@ -77,12 +96,28 @@ class BundleSystem : public System {
   Buffer<double> tiles_, diagonal_;      ///< one set per slice, the first ends up as the sum
   std::vector<Buffer<double>> scratch_;  ///< one per thread
   CameraVectors vectors_;
+  ChartRules chart_;  ///< of the points' steps
   Buffer<double> damping_, camera_step_;
   std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   std::unique_ptr<CameraSolver> solver_;
   double mean_square_ = 0;  ///< 2 cost / observations at the held state
   double point_decrease_ = 0;
-  ScaledLoss loss_;         ///< of the last proposal
+  ScaledLoss loss_;  ///< of the last proposal
+
+  // What a smaller radius at the same state is served from.
+  StepRequest request_;               ///< the last proposal
+  Step step_;                         ///< its answer
+  bool proposed_ = false;             ///< from the held state
+  const double* residual_ = nullptr;  ///< that an iterative solver left
+  std::uint64_t camera_solves_ = 0;
+  bool cut_ = false;           ///< and stopped at the radius
+  double newton_damping_ = 0;  ///< sum over points of n^T D n
+  std::optional<DoglegPlane> plane_;
+  std::unique_ptr<DoglegPasses> passes_;  ///< made when a radius first bounds a step
+  bool descended_ = false;                ///< passes_ holds this state's steepest descent
+  bool corrected_ = false;                ///< the coarse space could be factored
+  Buffer<double> blended_step_;
+
   Buffer<double> weights_;  ///< rho' of the held state, 8 per batch; empty without a loss
 };
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 
 #include "linear/chunks.h"
@@ -44,11 +45,17 @@ struct CameraSystem {
   const std::function<bool()>* cancelled = nullptr;
   const CoarseSpace* coarse = nullptr;  ///< factored; null: none
   bool precise = false;                 ///< in double, even by a mixed solver
+  /// An iterative solver stops where |x|_C reaches it, C = D / lambda (Steihaug 1983).
+  double radius = std::numeric_limits<double>::infinity();
+  double lambda = 0;
+  bool dogleg = false;  ///< keep what shorten() needs
 };
 
 struct CameraSolution {
   bool solved = false;
-  int iterations = 0;  ///< of an iterative solver
+  int iterations = 0;                ///< of an iterative solver
+  const double* residual = nullptr;  ///< b - (S + D) x, until the next solve; null: none is left
+  bool cut = false;                  ///< x ends at the radius
 };
 
 /// The seam inside one home of a System: how the camera system is solved.
@@ -57,6 +64,9 @@ class CameraSolver {
   virtual ~CameraSolver() = default;
   /// x has room for the columns rounded up to a multiple of 8.
   virtual CameraSolution solve(const CameraSystem& system, Buffer<double>& x) = 0;
+  /// What solve() would have found with the smaller radius that alone is new, without another
+  /// product; not solved: its x keeps within that radius, or the solver ends nowhere before.
+  virtual CameraSolution shorten(const CameraSystem&, Buffer<double>&) { return {}; }
   virtual std::uint64_t bytes() const = 0;
 };
 

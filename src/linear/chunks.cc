@@ -3,9 +3,12 @@
 #include "linear/chunks.h"
 
 #include <algorithm>
+#include <atomic>
+#include <optional>
 #include <unordered_map>
 
 #include "linear/plan.h"
+#include "platform/parallel.h"
 
 namespace sheaf {
 namespace {
@@ -13,12 +16,16 @@ namespace {
 /// Numbers the image pairs that occur, in order of row and column.
 class TileNumbers {
  public:
-  TileNumbers(const Batches& batches, std::uint32_t num_images) : images_(num_images) {
+  TileNumbers(const Batches& batches, std::uint32_t num_images, Threads& threads)
+      : images_(num_images) {
     dense_ = images_ <= kDenseImages;
     if (dense_) number_.assign(std::size_t(images_) * (images_ + 1) / 2, kNone);
-    for_each_image_set(batches, [&](const std::vector<std::uint32_t>& set) {
-      for (std::size_t i = 0; i < set.size(); ++i)
-        for (std::size_t j = 0; j < i; ++j) mark(set[i], set[j]);
+    const std::size_t groups = batches.groups.size();
+    threads.for_ranges(groups, dense_ ? kGroups : groups, [&](std::size_t g, std::size_t end) {
+      for_each_image_set(batches, g, end, [&](const std::vector<std::uint32_t>& set) {
+        for (std::size_t i = 0; i < set.size(); ++i)
+          for (std::size_t j = 0; j < i; ++j) mark(set[i], set[j]);
+      });
     });
     assign();
   }
@@ -45,6 +52,7 @@ class TileNumbers {
  private:
   static constexpr std::uint32_t kNone = UINT32_MAX;
   static constexpr std::uint32_t kDenseImages = 4096;
+  static constexpr std::size_t kGroups = 256;
 
   static std::size_t triangular(std::uint32_t row, std::uint32_t column) {
     return std::size_t(row) * (row + 1) / 2 + column;
@@ -53,10 +61,13 @@ class TileNumbers {
     return std::uint64_t(row) << 32 | column;
   }
   void mark(std::uint32_t row, std::uint32_t column) {
-    if (dense_)
-      number_[triangular(row, column)] = 0;
-    else
+    if (!dense_) {
       sparse_.emplace(key(row, column), 0);
+      return;
+    }
+    // Most are marked already: reading first keeps the line shared among threads.
+    std::atomic_ref<std::uint32_t> number(number_[triangular(row, column)]);
+    if (number.load(std::memory_order_relaxed) != 0) number.store(0, std::memory_order_relaxed);
   }
   void assign() {
     if (dense_) {
@@ -143,26 +154,26 @@ void for_each_partnered(const Batches& batches, const Chunk& chunk, const Visit&
   }
 }
 
-void list_diagonal(const Batches& batches, Chunk& chunk, Runs& runs, std::uint64_t& listed,
-                   Chunks& out) {
+/// Fills the diagonal's records from `listed` on; returns the end of its runs.
+DiagonalRun* list_diagonal(const Batches& batches, const Chunk& chunk, Runs& runs,
+                           std::uint64_t listed, std::uint16_t* diagonal, DiagonalRun* out) {
   runs.start(listed);
   for_each_record(batches, chunk, [&](std::uint32_t image, std::uint16_t) { runs.count(image); });
-  chunk.first_diagonal_run = out.diagonal_runs.size();
   runs.close(listed, [&](std::uint32_t image, std::uint32_t n, std::uint64_t at) {
-    out.diagonal_runs.push_back({image, n, at});
-    listed += n;
+    *out++ = {image, n, at};
   });
-  chunk.end_diagonal_run = out.diagonal_runs.size();
-  std::uint16_t* diagonal = out.diagonal.data();
   for_each_record(batches, chunk, [&](std::uint32_t image, std::uint16_t record) {
     diagonal[runs.place(image)] = record;
   });
   runs.clear();
+  return out;
 }
 
-/// `tile_of` has room for the pairs of any chunk.
-void list_pairs(const Batches& batches, const TileNumbers& numbers, Chunk& chunk, Runs& runs,
-                Buffer<std::uint32_t>& tile_of, std::uint64_t& listed, Chunks& out) {
+/// Fills the pairs from `listed` on; returns the end of its runs. `tile_of` has room for the pairs
+/// of any chunk.
+PairRun* list_pairs(const Batches& batches, const TileNumbers& numbers, const Chunk& chunk,
+                    Runs& runs, Buffer<std::uint32_t>& tile_of, std::uint64_t listed,
+                    RecordPair* pairs, PairRun* out) {
   runs.start(listed);
   std::uint32_t* tile = tile_of.data();
   for_each_partnered(batches, chunk, [&](const std::uint32_t* images, std::uint16_t, auto o) {
@@ -172,22 +183,25 @@ void list_pairs(const Batches& batches, const TileNumbers& numbers, Chunk& chunk
       runs.count(*tile++);
     }
   });
-  chunk.first_pair_run = out.pair_runs.size();
   runs.close(listed, [&](std::uint32_t tile_number, std::uint32_t n, std::uint64_t at) {
-    out.pair_runs.push_back({tile_number, n, at});
-    listed += n;
+    *out++ = {tile_number, n, at};
   });
-  chunk.end_pair_run = out.pair_runs.size();
   tile = tile_of.data();
-  RecordPair* pairs = out.pairs.data();
   for_each_partnered(batches, chunk, [&](const std::uint32_t*, std::uint16_t record, auto o) {
     for (std::uint32_t i = 0; i < o; ++i)
       pairs[runs.place(*tile++)] = {record, static_cast<std::uint16_t>(record - 8 * (o - i))};
   });
   runs.clear();
+  return out;
 }
 
-/// Pairs of records in a chunk.
+/// Records in a chunk, and pairs of them.
+std::uint64_t count_records(const Batches& batches, const Chunk& chunk) {
+  std::uint64_t records = 0;
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+    records += std::uint64_t(batches.groups[g].track) * batches.groups[g].lanes;
+  return records;
+}
 std::uint64_t count_pairs(const Batches& batches, const Chunk& chunk) {
   std::uint64_t pairs = 0;
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
@@ -195,6 +209,90 @@ std::uint64_t count_pairs(const Batches& batches, const Chunk& chunk) {
     pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
   }
   return pairs;
+}
+
+/// What precedes each chunk, and all chunks, of what count(chunk) counts.
+template <class Count>
+std::vector<std::uint64_t> sums_before(const std::vector<Chunk>& chunks, const Count& count) {
+  std::vector<std::uint64_t> sums{0};
+  sums.reserve(chunks.size() + 1);
+  for (const Chunk& chunk : chunks) sums.push_back(sums.back() + count(chunk));
+  return sums;
+}
+
+/// Lists the runs of every chunk, in order: list(c, to) writes those of chunk c and returns their
+/// end; a chunk has at most `keys` and at most items[c + 1] - items[c]. Sets the chunks' first and
+/// end.
+template <class Run, class List>
+Buffer<Run> list_runs(std::vector<Chunk>& chunks, const std::vector<std::uint64_t>& items,
+                      std::size_t keys, std::uint64_t Chunk::*first, std::uint64_t Chunk::*end,
+                      Threads& threads, const List& list) {
+  constexpr std::size_t kChunks = 8;
+  std::vector<Buffer<Run>> parts((chunks.size() + kChunks - 1) / kChunks);
+  threads.for_ranges(chunks.size(), kChunks, [&](std::size_t c, std::size_t last) {
+    Buffer<Run>& part = parts[c / kChunks];
+    part.allocate(std::min(items[last] - items[c], keys * (last - c)));
+    for (Run* to = part.data(); c < last; ++c) {
+      chunks[c].*first = static_cast<std::uint64_t>(to - part.data());
+      to = list(c, to);
+      chunks[c].*end = static_cast<std::uint64_t>(to - part.data());
+    }
+  });
+  std::uint64_t sum = 0;
+  std::vector<std::uint64_t> before;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    before.push_back(sum);
+    sum += chunks[std::min(chunks.size(), (p + 1) * kChunks) - 1].*end;
+  }
+  Buffer<Run> runs(sum);
+  threads.for_ranges(chunks.size(), kChunks, [&](std::size_t c, std::size_t last) {
+    const std::size_t p = c / kChunks;
+    std::copy_n(parts[p].data(), chunks[last - 1].*end, runs.data() + before[p]);
+    for (; c < last; ++c) chunks[c].*first += before[p], chunks[c].*end += before[p];
+    parts[p] = {};
+  });
+  return runs;
+}
+
+void list_diagonals(const Batches& batches, std::uint32_t num_images, Chunks& out,
+                    Threads& threads) {
+  const auto before =
+      sums_before(out.chunks, [&](const Chunk& chunk) { return count_records(batches, chunk); });
+  out.diagonal.allocate(before.back());
+  std::vector<std::optional<Runs>> of_worker(threads.count());
+  out.diagonal_runs = list_runs<DiagonalRun>(
+      out.chunks, before, num_images, &Chunk::first_diagonal_run, &Chunk::end_diagonal_run, threads,
+      [&](std::size_t c, DiagonalRun* to) {
+        std::optional<Runs>& runs = of_worker[threads.worker()];
+        if (!runs) runs.emplace(num_images);
+        return list_diagonal(batches, out.chunks[c], *runs, before[c], out.diagonal.data(), to);
+      });
+}
+
+void list_all_pairs(const Batches& batches, std::uint32_t num_images, Chunks& out,
+                    Threads& threads) {
+  TileNumbers numbers(batches, num_images, threads);
+  out.tiles = numbers.take_tiles();
+  const auto before =
+      sums_before(out.chunks, [&](const Chunk& chunk) { return count_pairs(batches, chunk); });
+  std::uint64_t most = 0;
+  for (std::size_t c = 0; c < out.chunks.size(); ++c)
+    most = std::max(most, before[c + 1] - before[c]);
+  out.pairs.allocate(before.back());
+  struct Scratch {
+    Runs runs;
+    Buffer<std::uint32_t> tile_of;
+  };
+  std::vector<std::optional<Scratch>> of_worker(threads.count());
+  out.pair_runs =
+      list_runs<PairRun>(out.chunks, before, out.tiles.size(), &Chunk::first_pair_run,
+                         &Chunk::end_pair_run, threads, [&](std::size_t c, PairRun* to) {
+                           std::optional<Scratch>& mine = of_worker[threads.worker()];
+                           if (!mine)
+                             mine.emplace(Runs(out.tiles.size()), Buffer<std::uint32_t>(most));
+                           return list_pairs(batches, numbers, out.chunks[c], mine->runs,
+                                             mine->tile_of, before[c], out.pairs.data(), to);
+                         });
 }
 
 std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_images) {
@@ -218,7 +316,8 @@ std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_im
 
 }  // namespace
 
-Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists) {
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
+                       Threads& threads) {
   Chunks out;
   const std::uint32_t groups = static_cast<std::uint32_t>(batches.groups.size());
   for (std::uint32_t g = 0; g < groups;) {
@@ -235,29 +334,15 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLi
     out.most_batches = std::max(out.most_batches, chunk.end_batch - chunk.first_batch);
     out.chunks.push_back(chunk);
   }
-  if (lists != ChunkLists::none) {
-    out.diagonal.allocate(batches.observations);
-    Runs by_image(num_images);
-    std::uint64_t listed = 0;
-    for (Chunk& chunk : out.chunks) list_diagonal(batches, chunk, by_image, listed, out);
-  }
-  if (lists == ChunkLists::pairs) {
-    TileNumbers numbers(batches, num_images);
-    out.tiles = numbers.take_tiles();
-    std::uint64_t pairs = 0, most = 0;
-    for (const Chunk& chunk : out.chunks) {
-      const std::uint64_t here = count_pairs(batches, chunk);
-      pairs += here, most = std::max(most, here);
-    }
-    out.pairs.allocate(pairs);
-    Buffer<std::uint32_t> tile_of(most);
-    Runs by_tile(out.tiles.size());
-    std::uint64_t listed = 0;
-    for (Chunk& chunk : out.chunks)
-      list_pairs(batches, numbers, chunk, by_tile, tile_of, listed, out);
-  }
+  if (lists != ChunkLists::none) list_diagonals(batches, num_images, out, threads);
+  if (lists == ChunkLists::pairs) list_all_pairs(batches, num_images, out, threads);
   out.slices = cut_into_slices(out, num_images);
   return out;
+}
+
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists) {
+  Threads alone(1);
+  return cut_into_chunks(batches, num_images, lists, alone);
 }
 
 }  // namespace sheaf

@@ -10,6 +10,8 @@
 
 namespace sheaf {
 
+class Threads;
+
 /// Consecutive groups whose elimination records (T and C, 384 bytes per observation) stay in the
 /// second-level cache between the pass that writes them and the passes that multiply them.
 struct Chunk {
@@ -48,9 +50,9 @@ struct Chunks {
 
   std::vector<Chunk> chunks;
   std::vector<Tile> tiles;
-  std::vector<PairRun> pair_runs;
+  Buffer<PairRun> pair_runs;
   Buffer<RecordPair> pairs;
-  std::vector<DiagonalRun> diagonal_runs;
+  Buffer<DiagonalRun> diagonal_runs;
   Buffer<std::uint16_t> diagonal;  ///< local record numbers
   std::uint64_t most_batches = 0;  ///< in any chunk
 
@@ -65,6 +67,8 @@ enum class ChunkLists {
   diagonal,  ///< records by image
   pairs,     ///< records by image, and pairs by tile; needs longest_track <= kLongestTrack
 };
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
+                       Threads& threads);
 Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists);
 
 }  // namespace sheaf

@@ -3,13 +3,15 @@
 #include "linear/clusters.h"
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <queue>
 #include <utility>
 
 namespace sheaf {
 
-Covisibility::Covisibility(const Batches& batches, std::size_t images) : first_(images + 1, 0) {
+Covisibility::Covisibility(const Batches& batches, std::size_t images, Threads& threads)
+    : first_(images + 1, 0) {
   std::uint64_t pairs = 0;
   for (const Batches::Group& group : batches.groups)
     for (std::uint32_t step = 1; step < group.track; step *= 2)
@@ -35,13 +37,16 @@ Covisibility::Covisibility(const Batches& batches, std::size_t images) : first_(
     others[next[a]++] = b;
     others[next[b]++] = a;
   });
-  merge(others);
+  merge(others, threads);
 }
 
-void Covisibility::merge(std::vector<std::uint32_t>& others) {
+void Covisibility::merge(std::vector<std::uint32_t>& others, Threads& threads) {
+  constexpr std::size_t kImages = 64;
+  threads.for_ranges(first_.size() - 1, kImages, [&](std::size_t i, std::size_t end) {
+    for (; i < end; ++i) std::sort(others.begin() + first_[i], others.begin() + first_[i + 1]);
+  });
   std::vector<std::uint64_t> first{0};
   for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
-    std::sort(others.begin() + first_[i], others.begin() + first_[i + 1]);
     for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) {
       if (neighbours_.size() > first.back() && neighbours_.back().image == others[k])
         ++neighbours_.back().weight;
@@ -154,24 +159,42 @@ class Growth {
   Clusters out_;
 };
 
+/// The clusters that see a point.
+void list_clusters(const Batches& batches, const Batches::Group& group, std::uint32_t lane,
+                   const Clusters& clusters, std::vector<std::int32_t>& touched) {
+  touched.clear();
+  const std::uint32_t* image = &batches.image[8 * group.first_batch + lane];
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::int32_t c = clusters.of_image[image[8 * o]];
+    if (c == Clusters::kNone || (!touched.empty() && touched.back() == c)) continue;
+    if (std::find(touched.begin(), touched.end(), c) == touched.end()) touched.push_back(c);
+  }
+}
+
 }  // namespace
 
-std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clusters& clusters) {
+std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clusters& clusters,
+                                               Threads& threads, std::size_t stride) {
+  constexpr std::size_t kGroups = 256;
   std::vector<std::int32_t> number(cluster_pair(clusters.count, 0), -1);
   if (clusters.count == 0) return number;
-  std::vector<std::int32_t> touched;
-  for (const Batches::Group& group : batches.groups)
-    for (std::uint32_t l = 0; l < group.lanes; ++l) {
-      touched.clear();
-      for (std::uint32_t o = 0; o < group.track; ++o) {
-        const std::int32_t c = clusters.of_image[batches.image[8 * (group.first_batch + o) + l]];
-        if (c == Clusters::kNone || (!touched.empty() && touched.back() == c)) continue;
-        if (std::find(touched.begin(), touched.end(), c) == touched.end()) touched.push_back(c);
+  const auto mark = [&](std::int32_t a, std::int32_t b) {
+    // Most are marked already: reading first keeps the line shared among threads.
+    std::atomic_ref<std::int32_t> at(number[cluster_pair(a, b)]);
+    if (at.load(std::memory_order_relaxed) != 0) at.store(0, std::memory_order_relaxed);
+  };
+  const std::size_t looked_at = (batches.groups.size() + stride - 1) / stride;
+  threads.for_ranges(looked_at, kGroups, [&](std::size_t first, std::size_t end) {
+    std::vector<std::int32_t> touched;
+    for (std::size_t g = first * stride; g < std::min(batches.groups.size(), end * stride);
+         g += stride)
+      for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l) {
+        list_clusters(batches, batches.groups[g], l, clusters, touched);
+        for (std::int32_t a : touched)
+          for (std::int32_t b : touched)
+            if (a >= b) mark(a, b);
       }
-      for (std::int32_t a : touched)
-        for (std::int32_t b : touched)
-          if (a >= b) number[cluster_pair(a, b)] = 0;
-    }
+  });
   for (std::int32_t c = 0; c < clusters.count; ++c) number[cluster_pair(c, c)] = 0;
   std::int32_t next = 0;
   for (std::int32_t& n : number)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "linear/columns.h"
+#include "platform/parallel.h"
 #include "residual/batches.h"
 
 namespace sheaf {
@@ -17,14 +18,14 @@ class Covisibility {
   struct Neighbour {
     std::uint32_t image, weight;
   };
-  Covisibility(const Batches& batches, std::size_t images);
+  Covisibility(const Batches& batches, std::size_t images, Threads& threads);
 
   const Neighbour* begin(std::size_t image) const { return &neighbours_[first_[image]]; }
   const Neighbour* end(std::size_t image) const { return &neighbours_[first_[image + 1]]; }
 
  private:
   static constexpr std::uint64_t kPairsPerImage = 512, kMostPairs = 4000000;
-  void merge(std::vector<std::uint32_t>& others);
+  void merge(std::vector<std::uint32_t>& others, Threads& threads);
 
   std::vector<std::uint64_t> first_;
   std::vector<Neighbour> neighbours_;  ///< of each image, ascending
@@ -35,11 +36,13 @@ struct Clusters {
   static constexpr std::int32_t kNone = -1;
   std::vector<std::int32_t> of_image;  ///< kNone where the pose is held
   std::int32_t count = 0;
+  std::vector<std::int32_t> pairs{};  ///< number_cluster_pairs, where they have been numbered
 };
 
 /// Numbers the pairs of clusters (row >= column, by triangle) that see a point in common, and all
-/// clusters with themselves; -1: none.
-std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clusters& clusters);
+/// clusters with themselves; -1: none. Looks at every `stride`th group.
+std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clusters& clusters,
+                                               Threads& threads, std::size_t stride = 1);
 
 std::uint64_t count_cluster_pairs(const std::vector<std::int32_t>& numbers);
 

@@ -27,16 +27,20 @@ constexpr double kRegularisation = 1e-10;
 
 }  // namespace
 
-Clusters coarse_clusters(const Batches& batches, const Columns& columns) {
+Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads& threads) {
+  constexpr std::size_t kSample = 16;
   const std::size_t images = columns.num_images();
   if (images < kFewestImages) return {};
-  const Covisibility graph(batches, images);
+  const Covisibility graph(batches, images, threads);
   for (std::size_t each = std::max(kImagesEach, images / kMostClusters); each <= images;
        each += each / 2) {
     Clusters clusters = cluster_images(graph, columns, each);
-    if (clusters.count <= kMostClusters &&
-        count_cluster_pairs(number_cluster_pairs(batches, clusters)) <= kMostPairs)
-      return clusters;
+    if (clusters.count > kMostClusters) continue;
+    // A sample of the points shows most of those that have too many pairs.
+    if (count_cluster_pairs(number_cluster_pairs(batches, clusters, threads, kSample)) > kMostPairs)
+      continue;
+    clusters.pairs = number_cluster_pairs(batches, clusters, threads);
+    if (count_cluster_pairs(clusters.pairs) <= kMostPairs) return clusters;
   }
   return {};  // hundreds of parts that share nothing
 }
@@ -54,7 +58,8 @@ CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Cluster
       centres_(clusters_.count),
       scale_(kCoarseModes * clusters_.count),
       basis_(kCoarseBasis * columns.num_images()),
-      tile_(number_cluster_pairs(batches, clusters_)),
+      tile_(clusters_.pairs.empty() ? number_cluster_pairs(batches, clusters_, threads)
+                                    : std::move(clusters_.pairs)),
       tiles_(count_cluster_pairs(tile_)),
       cholesky_(kCoarseModes * clusters_.count, kernels.name),
       coarse_(kCoarseModes * clusters_.count) {

@@ -66,6 +66,6 @@ class CoarseSpace {
 };
 
 /// The clusters of a coarse space, or none where there are too few images for one to pay.
-Clusters coarse_clusters(const Batches& batches, const Columns& columns);
+Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads& threads);
 
 }  // namespace sheaf

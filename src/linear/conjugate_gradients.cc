@@ -3,6 +3,7 @@
 #include "linear/conjugate_gradients.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace sheaf {
 
@@ -17,7 +18,9 @@ ConjugateGradients::ConjugateGradients(const Columns& columns) : columns_(column
   image_x_.fill(0);
 }
 
-std::uint64_t ConjugateGradients::bytes() const { return 4 * r_.bytes() + 2 * image_x_.bytes(); }
+std::uint64_t ConjugateGradients::bytes() const {
+  return path_.bytes() + 4 * r_.bytes() + 2 * image_x_.bytes();
+}
 
 void ConjugateGradients::start(const double* b, Buffer<double>& x) {
   x.fill(0);
@@ -37,6 +40,25 @@ void ConjugateGradients::apply(ImageOperator& S, const double* damping) {
     for (int k = 0; k < 9; ++k)
       if (const std::int32_t c = columns_.image(i)[k]; c >= 0)
         q_[c] += image_y_[kImageVector * i + k];
+}
+
+CameraSolution ConjugateGradients::shorten(const CameraSystem& system, Buffer<double>& x) {
+  if (!path_.cut(metric(system), system.radius, x, r_)) return {};
+  return {true, 0, r_.data(), true};
+}
+
+SteihaugPath::Metric ConjugateGradients::metric(const CameraSystem& system) const {
+  return {system.damping, system.lambda, static_cast<std::size_t>(columns_.count)};
+}
+
+double ConjugateGradients::length(const CameraSystem& system, const Buffer<double>& x) const {
+  return std::sqrt(metric(system).product(x.data(), x.data()));
+}
+
+double ConjugateGradients::longest_step(const CameraSystem& system, const Buffer<double>& x) const {
+  return std::isinf(system.radius)
+             ? system.radius
+             : distance_to_boundary(metric(system), x.data(), p_.data(), system.radius);
 }
 
 void ConjugateGradients::copy(const Buffer<double>& from, Buffer<double>& to) {

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 #include "linear/camera_solver.h"
 #include "linear/columns.h"
+#include "linear/steihaug_path.h"
 #include "platform/buffer.h"
 
 namespace sheaf {
@@ -22,7 +24,9 @@ constexpr std::size_t kImageVector = 16;
 
 /// Preconditioned conjugate gradients on (P^T S P + D) x = b with P the numbering of columns.
 /// Stops when an iteration's part of the decrease Q = -1/2 x.(b + r) of the quadratic model falls
-/// below `forcing` of the mean part so far (Nash and Sofer 1990), or the residual is at rounding.
+/// below `forcing` of the mean part so far (Nash and Sofer 1990), or the residual is at rounding;
+/// with a radius, also where a step would leave it or finds no curvature: there the last step goes
+/// on to the boundary (Steihaug 1983).
 class ConjugateGradients {
  public:
   explicit ConjugateGradients(const Columns& columns);
@@ -32,32 +36,40 @@ class ConjugateGradients {
                      Buffer<double>& x) {
     const double* b = system.vectors->rhs.data();
     start(b, x);
+    if (system.dogleg) path_.begin(r_);
     M.solve(r_.data(), z_.data());
     copy(z_, p_);
     double rz = dot(r_, z_);
     const double rz_start = rz;
     double model = 0;
-    if (!(rz > 0)) return {rz == 0, 0};
+    if (!(rz > 0)) return {rz == 0, 0, r_.data()};
     for (int iteration = 1; iteration <= kMaxIterations; ++iteration) {
-      if (system.cancelled != nullptr && (*system.cancelled)()) return {false, iteration - 1};
+      if (system.cancelled != nullptr && (*system.cancelled)())
+        return {false, iteration - 1, nullptr};
       apply(S, system.damping);
       const double curvature = dot(p_, q_);
-      if (!(curvature > 0)) return {iteration > 1, iteration};
-      const double alpha = rz / curvature;
-      axpy(alpha, p_, x);
-      axpy(-alpha, q_, r_);
+      const double alpha = rz / curvature, most = longest_step(system, x);
+      const bool cut = std::isfinite(most) && (most <= alpha || !(curvature > 0));
+      if (!cut && !(curvature > 0)) return {iteration > 1, iteration, r_.data()};
+      axpy(cut ? most : alpha, p_, x);
+      axpy(cut ? -most : -alpha, q_, r_);
+      if (system.dogleg) path_.add(x, r_, length(system, x));
+      if (cut) return {true, iteration, r_.data(), true};
       const double before = model;
       model += 0.5 * alpha * rz;
       M.solve(r_.data(), z_.data());
       const double rz_next = dot(r_, z_);
       const bool small =
           iteration >= kMinIterations && iteration * (model - before) < system.forcing * model;
-      if (small || rz_next <= 1e-28 * rz_start) return {true, iteration};
+      if (small || rz_next <= 1e-28 * rz_start) return {true, iteration, r_.data()};
       scale_add(rz_next / rz, z_, p_);
       rz = rz_next;
     }
-    return {true, kMaxIterations};
+    return {true, kMaxIterations, r_.data()};
   }
+
+  /// x where the path of the last run meets the radius of `system`.
+  CameraSolution shorten(const CameraSystem& system, Buffer<double>& x);
 
   std::uint64_t bytes() const;
 
@@ -69,6 +81,10 @@ class ConjugateGradients {
 
   void start(const double* b, Buffer<double>& x);
   void apply(ImageOperator& S, const double* damping);
+  SteihaugPath::Metric metric(const CameraSystem& system) const;
+  double length(const CameraSystem& system, const Buffer<double>& x) const;
+  /// How far along p the radius lets x go.
+  double longest_step(const CameraSystem& system, const Buffer<double>& x) const;
   static void copy(const Buffer<double>& from, Buffer<double>& to);
   static double dot(const Buffer<double>& a, const Buffer<double>& b);
   static void axpy(double alpha, const Buffer<double>& x, Buffer<double>& y);
@@ -76,6 +92,7 @@ class ConjugateGradients {
   static void scale_add(double beta, const Buffer<double>& z, Buffer<double>& p);
 
   const Columns& columns_;
+  SteihaugPath path_;  ///< for a dogleg
   Buffer<double> r_, z_, p_, q_, image_x_, image_y_;
 };
 

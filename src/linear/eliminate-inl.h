@@ -12,6 +12,7 @@
 #endif
 
 #include "linear/kernels.h"
+#include "linear/point_chart-inl.h"
 #include "residual/bal_lanes-inl.h"
 #include "residual/loss_lanes-inl.h"
 
@@ -112,14 +113,73 @@ HWY_INLINE V damp(V lambda, V v) {
   return hn::Mul(lambda, hn::Min(hn::Max(v, set(kDiagonalFloor)), set(kDiagonalCeiling)));
 }
 
+/// The factor of V + D by X, Y, Z and its w, from those by a chart's coordinates. With E = dX/dq,
+///   M = L^-1 E^T = Q N,  N lower triangular:   (V + D)^-1 = E L^-T L^-1 E^T = N^T N,
+/// so that N is the inverse factor by X, Y, Z and Q^T w its w. Formed by X, Y, Z themselves V would
+/// lose what it knows of a far point's distance, which goes with one over its fourth power.
+HWY_INLINE void factor_by_xyz(const LaneChart& chart, const Factor& f, const V* w, Factor& out,
+                              V* w_out) {
+  V m[3][3], rest[3] = {w[0], w[1], w[2]}, N[3][3];
+  for (int k = 0; k < 3; ++k) {
+    const V s[3] = {hn::Mul(chart.reach, chart.t1[k]), hn::Mul(chart.reach, chart.t2[k]),
+                    hn::Mul(chart.outward, chart.n[k])};
+    forward(f, s, m[k]);
+  }
+  V inverse[3];
+  for (int i = 2; i >= 0; --i) {  // Gram and Schmidt, from the last column
+    N[i][i] = hn::Sqrt(dot3(m[i], m[i]));
+    inverse[i] = hn::Div(set(1.0), N[i][i]);
+    for (V& x : m[i]) x = hn::Mul(x, inverse[i]);
+    const auto take = [&](V* from) {
+      const V along = dot3(m[i], from);
+      for (int k = 0; k < 3; ++k) from[k] = fnma(m[i][k], along, from[k]);
+      return along;
+    };
+    w_out[i] = take(rest);
+    for (int k = 0; k < i; ++k) N[i][k] = take(m[k]);
+  }
+  out.i00 = N[0][0], out.i11 = N[1][1], out.i22 = N[2][2];
+  out.l10 = hn::Neg(hn::Mul(hn::Mul(N[1][0], inverse[0]), inverse[1]));
+  out.l21 = hn::Neg(hn::Mul(hn::Mul(N[2][1], inverse[1]), inverse[2]));
+  out.l20 = hn::Neg(hn::Mul(fma(out.l21, N[1][0], hn::Mul(N[2][0], inverse[2])), inverse[0]));
+}
+
+/// Damping of the outward coordinate: more where rounding would pass for parallax, and where the
+/// point is at its bound (ChartRules).
+HWY_INLINE V damp_outward(const ChartRules& rules, const LaneChart& chart, const PointSums& p,
+                          V damping) {
+  const V least = hn::Mul(set(rules.rounding * rules.unit), chart.reach);
+  damping = hn::Max(damping, hn::Mul(hn::Mul(least, least), hn::Add(p.v00, p.v11)));
+  if (rules.crosses) return damping;
+  const auto bound = hn::And(hn::Gt(chart.reach, set(kBound / rules.unit)), hn::Gt(p.g[2], zero()));
+  return hn::Max(damping, hn::IfThenElseZero(bound, damp(set(kAtBound), p.v22)));
+}
+
+/// Marquardt's damping of a part's points and the factor of V + D.
+struct DampedFactor {
+  Factor f;
+  V D[3];
+
+  template <bool Charted>
+  HWY_INLINE void compute(const EliminateInput& in, const PointSums& p,
+                          [[maybe_unused]] const LaneChart& chart) {
+    const V lambda = set(in.damping);
+    D[0] = damp(lambda, p.v00), D[1] = damp(lambda, p.v11), D[2] = damp(lambda, p.v22);
+    if constexpr (Charted) D[2] = damp_outward(in.chart, chart, p, D[2]);
+    f = factor3(hn::Add(p.v00, D[0]), p.v01, p.v02, hn::Add(p.v11, D[1]), p.v12,
+                hn::Add(p.v22, D[2]));
+    if (!in.points_held) return;  // L^-1 = 0: nothing is eliminated, nothing moves
+    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
+    D[0] = D[1] = D[2] = zero();
+  }
+};
+
 struct EliminateSums {
   V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
 
 /// One part of one group, whose rows are known.
 struct GroupPart {
-  double damping;
-  bool points_held;
   std::uint32_t track;
   std::size_t group;
   int part;
@@ -127,25 +187,26 @@ struct GroupPart {
 
 /// Factors the points of a part and writes their records; the rows of observation o stand at
 /// rows + stride o.
-HWY_INLINE void finish_group(const PointSums& p, const GroupPart& of, const double* rows,
-                             std::size_t stride, double* T, double* C, const EliminateOutput& to,
-                             EliminateSums& sums) {
+template <bool Charted>
+HWY_INLINE void finish_group(const EliminateInput& in, const PointSums& p,
+                             [[maybe_unused]] const LaneChart& chart, const GroupPart& of,
+                             const double* rows, std::size_t stride, double* T, double* C,
+                             const EliminateOutput& to, EliminateSums& sums) {
   const int lane = of.part * kLanes;
-  const V lambda = set(of.damping);
-  V D0 = damp(lambda, p.v00), D1 = damp(lambda, p.v11), D2 = damp(lambda, p.v22);
-  Factor f =
-      factor3(hn::Add(p.v00, D0), p.v01, p.v02, hn::Add(p.v11, D1), p.v12, hn::Add(p.v22, D2));
-  if (of.points_held) {  // L^-1 = 0: nothing is eliminated, nothing moves
-    f.i00 = f.l10 = f.l20 = f.i11 = f.l21 = f.i22 = zero();
-    D0 = D1 = D2 = zero();
-  }
+  DampedFactor damped;
+  damped.compute<Charted>(in, p, chart);
+  const Factor& f = damped.f;
   V w[3];
   forward(f, p.g, w);
   const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
   sums.decrease[of.part] = hn::Add(sums.decrease[of.part], w2);
   sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], w2);
   double* out = to.factors + kFactorGroup * of.group + lane;
-  const V all[12] = {f.i00, f.l10, f.l20, f.i11, f.l21, f.i22, w[0], w[1], w[2], D0, D1, D2};
+  Factor x = f;
+  V y[3] = {w[0], w[1], w[2]};
+  if constexpr (Charted) factor_by_xyz(chart, f, w, x, y);
+  const V all[12] = {x.i00, x.l10, x.l20, x.i11,       x.l21,       x.i22,
+                     y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
   for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
 
   for (std::uint32_t o = 0; o < of.track; ++o)
@@ -165,7 +226,7 @@ HWY_INLINE Rho apply_loss(const ScaledLoss& loss, LaneJacobian& j) {
   return rho;
 }
 
-template <bool Robust>
+template <bool Robust, bool Charted>
 HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& group, std::size_t g,
                                int part, double* jacobians, double* T, double* C,
                                const EliminateOutput& to, EliminateSums& sums) {
@@ -175,6 +236,12 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   const V X0 = load(X), X1 = load(X + 8), X2 = load(X + 16);
   const V mask = lane_mask(group.lanes, lane);
   const V* scale = group.lanes < 8 ? &mask : nullptr;
+  [[maybe_unused]] LaneChart chart;
+  if constexpr (Charted) {
+    V base[3];
+    load_base(in.chart, batches, group.first_batch, lane, in.cameras, base);
+    chart.place(in.chart, X0, X1, X2, base);
+  }
   PointSums p;
   p.clear();
   V square = sums.square[part], robust = sums.loss[part];
@@ -190,14 +257,16 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
       robust = hn::Add(robust, rho.value);
       store(rho.weight, to.weights + 8 * b + lane);
     }
+    if constexpr (Charted)
+      for (V* row : {j.point[0], j.point[1]}) chart.transpose(row);
     p.add(j);
     save(j, jacobians + kJacobianFields * kLanes * o);
   }
   sums.square[part] = square;
   sums.loss[part] = robust;
 
-  finish_group(p, {in.damping, in.points_held, group.track, g, part}, jacobians,
-               kJacobianFields * kLanes, T, C, to, sums);
+  finish_group<Charted>(in, p, chart, {group.track, g, part}, jacobians, kJacobianFields * kLanes,
+                        T, C, to, sums);
 }
 
 HWY_INLINE double sum_parts(const V* parts) {
@@ -214,7 +283,7 @@ HWY_INLINE double max_parts(const V* parts) {
   return most;
 }
 
-template <bool Robust>
+template <bool Robust, bool Charted>
 inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, const Records& records,
                             EliminateOutput& out) {
   EliminateSums sums;
@@ -224,8 +293,9 @@ inline void linearize_chunk(const EliminateInput& in, const Chunk& chunk, const 
     const Batches::Group group = in.batches->groups[g];
     const std::size_t record = 8 * (group.first_batch - chunk.first_batch);
     for (int p = 0; p < kParts; ++p)
-      eliminate_part<Robust>(in, group, g, p, records.jacobians, records.T + kTRecord * record,
-                             records.C + kCRecord * record, out, sums);
+      eliminate_part<Robust, Charted>(in, group, g, p, records.jacobians,
+                                      records.T + kTRecord * record, records.C + kCRecord * record,
+                                      out, sums);
   }
   out.square_sum += sum_parts(sums.square);
   if (Robust) out.loss_sum += sum_parts(sums.loss);

@@ -158,6 +158,9 @@ class ExplicitSolver : public CameraSolver {
     }
     return rounded_ ? run(*rounded_, system, x) : run(*exact_, system, x);
   }
+  CameraSolution shorten(const CameraSystem& system, Buffer<double>& x) override {
+    return cg_.shorten(system, x);
+  }
   std::uint64_t bytes() const override {
     return (rounded_ ? rounded_->bytes() : exact_->bytes()) + blocks_.bytes() + cg_.bytes();
   }

@@ -9,13 +9,13 @@
 
 namespace sheaf {
 FloatImplicitOperator::FloatImplicitOperator(const Columns& columns, const HeldState& state,
-                                             const Kernels& kernels, Threads& threads)
+                                             const Kernels& kernels, ProductSums& sums)
     : columns_(columns),
       state_(state),
       kernels_(kernels),
       images_(columns.num_images()),
       cameras_(kFloatCameraRecord * images_),
-      sums_(state, threads) {
+      sums_(sums) {
   cameras_.fill(0);
 }
 
@@ -95,6 +95,6 @@ void FloatImplicitOperator::write_step(const double* x, double scale, std::size_
   for (int k = 0; k < 9; ++k) to[k] = static_cast<float>(scale * step[k]);
 }
 
-std::uint64_t FloatImplicitOperator::bytes() const { return cameras_.bytes() + sums_.bytes(); }
+std::uint64_t FloatImplicitOperator::bytes() const { return cameras_.bytes(); }
 
 }  // namespace sheaf

@@ -16,7 +16,7 @@ namespace sheaf {
 class FloatImplicitOperator : public ImageOperator {
  public:
   FloatImplicitOperator(const Columns& columns, const HeldState& state, const Kernels& kernels,
-                        Threads& threads);
+                        ProductSums& sums);
 
   /// Takes the held state, and diag(J^T J) by column to scale x with.
   void prepare(const double* squares);
@@ -34,7 +34,7 @@ class FloatImplicitOperator : public ImageOperator {
   double origin_[3] = {0, 0, 0}, scale_ = 1;
   const double* squares_ = nullptr;
   Buffer<float> cameras_;  ///< kFloatCameraRecord per image
-  ProductSums sums_;
+  ProductSums& sums_;
 };
 
 }  // namespace sheaf

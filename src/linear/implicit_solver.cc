@@ -15,8 +15,8 @@ namespace {
 /// S x with Jacobians recomputed.
 class ImplicitOperator : public ImageOperator {
  public:
-  ImplicitOperator(const HeldState& state, const Kernels& kernels, Threads& threads)
-      : state_(state), kernels_(kernels), sums_(state, threads) {}
+  ImplicitOperator(const HeldState& state, const Kernels& kernels, ProductSums& sums)
+      : state_(state), kernels_(kernels), sums_(sums) {}
 
   void apply(const double* x, double* y) override {
     const auto record = [&](std::size_t image) {
@@ -34,12 +34,10 @@ class ImplicitOperator : public ImageOperator {
               });
   }
 
-  std::uint64_t bytes() const { return sums_.bytes(); }
-
  private:
   HeldState state_;
   const Kernels& kernels_;
-  ProductSums sums_;
+  ProductSums& sums_;
 };
 
 /// In mixed precision the operator is single until the system asks for double.
@@ -47,8 +45,11 @@ class ImplicitSolver : public CameraSolver {
  public:
   ImplicitSolver(const Columns& columns, const HeldState& state, bool mixed, const Kernels& kernels,
                  Threads& threads)
-      : operator_(state, kernels, threads), blocks_(columns, threads), cg_(columns) {
-    if (mixed) rounded_ = std::make_unique<FloatImplicitOperator>(columns, state, kernels, threads);
+      : sums_(state, threads),
+        operator_(state, kernels, sums_),
+        blocks_(columns, threads),
+        cg_(columns) {
+    if (mixed) rounded_ = std::make_unique<FloatImplicitOperator>(columns, state, kernels, sums_);
   }
 
   CameraSolution solve(const CameraSystem& system, Buffer<double>& x) override {
@@ -58,11 +59,15 @@ class ImplicitSolver : public CameraSolver {
     ImageOperator& S = round ? static_cast<ImageOperator&>(*rounded_) : operator_;
     return cg_.run(S, Preconditioner{blocks_, system.coarse}, system, x);
   }
+  CameraSolution shorten(const CameraSystem& system, Buffer<double>& x) override {
+    return cg_.shorten(system, x);
+  }
   std::uint64_t bytes() const override {
-    return operator_.bytes() + (rounded_ ? rounded_->bytes() : 0) + blocks_.bytes() + cg_.bytes();
+    return sums_.bytes() + (rounded_ ? rounded_->bytes() : 0) + blocks_.bytes() + cg_.bytes();
   }
 
  private:
+  ProductSums sums_;  ///< of whichever operator runs
   ImplicitOperator operator_;
   std::unique_ptr<FloatImplicitOperator> rounded_;
   BlockDiagonal blocks_;

@@ -22,13 +22,17 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-// Each is compiled twice, so that a problem without a loss pays nothing for those that have one.
+// Each is compiled with and without a loss, and with and without charts of the points, so that a
+// problem that has none pays nothing for those that do.
 void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
                EliminateOutput& out) {
-  if (in.loss.kind == LossKind::none)
-    linearize_chunk<false>(in, chunk, records, out);
+  const bool robust = in.loss.kind != LossKind::none;
+  if (in.chart.base == ChartBase::none)
+    robust ? linearize_chunk<true, false>(in, chunk, records, out)
+           : linearize_chunk<false, false>(in, chunk, records, out);
   else
-    linearize_chunk<true>(in, chunk, records, out);
+    robust ? linearize_chunk<true, true>(in, chunk, records, out)
+           : linearize_chunk<false, true>(in, chunk, records, out);
 }
 
 void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
@@ -46,10 +50,11 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  if (in.loss.kind == LossKind::none)
-    trial_chunk<false>(in, chunk, out);
+  const bool robust = in.loss.kind != LossKind::none;
+  if (in.chart.base == ChartBase::none)
+    robust ? trial_chunk<true, false>(in, chunk, out) : trial_chunk<false, false>(in, chunk, out);
   else
-    trial_chunk<true>(in, chunk, out);
+    robust ? trial_chunk<true, true>(in, chunk, out) : trial_chunk<false, true>(in, chunk, out);
 }
 
 void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {

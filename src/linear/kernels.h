@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "geometry/loss.h"
+#include "geometry/point_chart.h"
 #include "linear/chunks.h"
 #include "residual/batches.h"
 
@@ -30,7 +31,8 @@ inline void write_step(const double* lens, const double* x, double* step) {
 /// Points: 24 doubles per group: X of the eight lanes, then Y, then Z.
 constexpr std::size_t kPointGroup = 24;
 /// What elimination leaves per group, 8 lanes each: the factor L^-1 with V + D = L L^T stored as
-/// i00, l10, l20, i11, l21, i22 (diagonal inverted), w = L^-1 g (3), D (3).
+/// i00, l10, l20, i11, l21, i22 (diagonal inverted), w = L^-1 g (3), D (3). V, L, g and w are by X,
+/// Y and Z, whatever the chart; D is by the chart's coordinates.
 constexpr std::size_t kFactorGroup = 96;
 
 /// Column order of a camera block: rho (3), phi (3), f, k1, k2.
@@ -52,6 +54,7 @@ struct EliminateInput {
   double damping;         ///< lambda: D = lambda diag(V), clamped as below
   bool points_held;
   ScaledLoss loss{};
+  ChartRules chart{};
 };
 /// diag(J^T J) is clamped to this range before it is scaled by lambda.
 constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
@@ -63,19 +66,6 @@ struct EliminateOutput {
   double gradient_max2;       ///< largest |w|^2 of a point
   double loss_sum = 0;        ///< sum rho(|r|^2); not summed without a loss
   double* weights = nullptr;  ///< rho'(|r|^2), 8 per batch; not written without a loss
-};
-
-struct TrialInput {
-  const Batches* batches;
-  const double* cameras;        ///< held state, with the step
-  const double* trial_cameras;  ///< stepped
-  const double* points;
-  const double* factors;
-  bool count_newly_behind;
-  int inner_iterations;  ///< at most, of each point
-  double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
-  ScaledLoss loss{};
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
 };
 
 /// Once the cameras have stepped and the points followed by back-substitution, each point takes
@@ -91,13 +81,40 @@ constexpr double kWorthMore = 0.1;  ///< after a larger one, another step is loo
 /// Of the step's own D. Measured: 1 costs iterations, 0.1 led ladybug-49 into a worse minimum from
 /// some starting dampings.
 constexpr double kDamping = 0.3;
+/// In a chart a point that the step leaves worse than this, and worse than if it had only followed
+/// its base, follows its base: its distance is damped by what is seen of it, which may be little,
+/// and a long step can end anywhere, in a camera's plane too.
+constexpr double kLost = 1e4;
 }  // namespace inner_iterations
+
+/// The step of a point: `newton` times what back-substitution gives and `descent` times D^-1 g; of
+/// points by X, Y, Z only.
+struct PointBlend {
+  double newton = 1, descent = 0;
+  double inner_damping = inner_iterations::kDamping;
+  bool plain() const { return newton == 1 && descent == 0; }
+};
+
+struct TrialInput {
+  const Batches* batches;
+  const double* cameras;        ///< held state, with the step
+  const double* trial_cameras;  ///< stepped
+  const double* points;
+  const double* factors;
+  bool count_newly_behind;
+  int inner_iterations;  ///< at most, of each point
+  double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
+  ScaledLoss loss{};
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  ChartRules chart{};               ///< as in elimination; ChartBase::none where points are held
+  PointBlend blend{};
+};
 
 struct TrialOutput {
   double* points;              ///< stepped
   double square_sum;           ///< sum |r|^2 at the stepped state
-  double damping_term;         ///< sum d^T D d over points
-  double step2_max;            ///< largest |d|^2 / |X|^2 of a point
+  double damping_term;         ///< sum d^T D d over points, d as back-substituted
+  double step2_max;            ///< largest |d|^2 / |X|^2 of a point, or chart_step2
   std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
   double loss_sum = 0;         ///< sum rho(|r|^2) there; not summed without a loss
 };

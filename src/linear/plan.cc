@@ -3,33 +3,54 @@
 #include "linear/plan.h"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <vector>
 
 #include "linear/block_rows.h"
 #include "linear/coarse_space.h"
+#include "linear/forecast.h"
 #include "linear/kernels.h"
 #include "linear/sparse_cholesky.h"
 
 namespace sheaf {
 namespace {
 
-/// Distinct image pairs that share a point, by marking a triangular bitmap; listed as far as there
-/// is room for them in a list of kAnalysedTiles.
-std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list) {
-  std::vector<std::uint64_t> marked((images * (images + 1) / 2 + 63) / 64, 0);
-  std::uint64_t tiles = 0;
-  for_each_image_set(batches, [&](const std::vector<std::uint32_t>& set) {
-    for (std::size_t i = 0; i < set.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j) {
-        const std::uint64_t at = std::uint64_t(set[i]) * (set[i] + 1) / 2 + set[j];
-        std::uint64_t& word = marked[at / 64];
-        const std::uint64_t bit = std::uint64_t(1) << (at % 64);
-        if ((word & bit) != 0) continue;
-        word |= bit;
-        if (++tiles <= WorkCounts::kAnalysedTiles)
-          list.push_back({std::max(set[i], set[j]), std::min(set[i], set[j])});
-      }
+/// Distinct image pairs that share a point, by marking a triangular bitmap; listed if they are at
+/// most kAnalysedTiles.
+std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vector<Tile>& list,
+                          Threads& threads) {
+  constexpr std::size_t kGroups = 256, kWords = 65536;
+  const auto row_start = [](std::uint64_t row) { return row * (row + 1) / 2; };
+  std::vector<std::uint64_t> marked((row_start(images) + 63) / 64, 0);
+  threads.for_ranges(batches.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
+    for_each_image_set(batches, g, end, [&](const std::vector<std::uint32_t>& set) {
+      for (std::size_t i = 0; i < set.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j) {
+          const std::uint64_t at = row_start(set[i]) + set[j];
+          const std::uint64_t bit = std::uint64_t(1) << (at % 64);
+          // Most are marked already: reading first keeps the line shared among threads.
+          std::atomic_ref<std::uint64_t> word(marked[at / 64]);
+          if ((word.load(std::memory_order_relaxed) & bit) == 0)
+            word.fetch_or(bit, std::memory_order_relaxed);
+        }
+    });
   });
+  std::atomic<std::uint64_t> tiles{0};
+  threads.for_ranges(marked.size(), kWords, [&](std::size_t w, std::size_t end) {
+    std::uint64_t here = 0;
+    for (; w < end; ++w) here += static_cast<std::uint64_t>(std::popcount(marked[w]));
+    tiles += here;
+  });
+  if (tiles > WorkCounts::kAnalysedTiles) return tiles;
+  list.reserve(tiles);
+  for (std::uint64_t w = 0, row = 0; w < marked.size(); ++w)
+    for (std::uint64_t word = marked[w]; word != 0; word &= word - 1) {
+      const std::uint64_t at = 64 * w + static_cast<std::uint64_t>(std::countr_zero(word));
+      while (at >= row_start(row + 1)) ++row;
+      list.push_back(
+          {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(at - row_start(row))});
+    }
   return tiles;
 }
 
@@ -37,15 +58,13 @@ void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
   const auto n = static_cast<double>(c.columns);
   c.sparse_flops = n * n * n / 3;
   c.sparse_doubles = c.columns * (c.columns + 8);
-  c.sparse_bytes = 8 * c.sparse_doubles;
   if (tiles.size() == c.tiles) {
     const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
     c.sparse_flops = symbolic.flops;
     c.sparse_doubles = symbolic.panel_doubles;
-    c.sparse_bytes = SparseCholesky::bytes(symbolic);
+    c.sparse_bytes = SparseCholesky::bytes(symbolic) - 8 * symbolic.panel_doubles;
   }
-  // The way of each tile into the factor, listed and sorted; several where lenses are shared.
-  c.sparse_bytes += (columns.lens_shared ? 4 : 1) * (24 + 28) * (c.tiles + c.images);
+  c.lens_shared = columns.lens_shared;
 }
 
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
@@ -121,7 +140,8 @@ const char* to_string(SolverKind kind) {
   return "dense";
 }
 
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held) {
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
+                      Clusters& clusters, Threads& threads) {
   WorkCounts c;
   c.images = columns.num_images();
   c.columns = static_cast<std::uint64_t>(columns.count);
@@ -135,12 +155,13 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
     c.pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
   const std::uint64_t all = c.images * (c.images + 1) / 2;
   std::vector<Tile> tiles;
-  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles)
+  c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles, threads)
                                                  : std::min(all, c.pairs);
   count_sparse(columns, tiles, c);
-  const Clusters clusters = coarse_clusters(batches, columns);
+  c.pair_runs = estimate_pair_runs(batches, c);
+  clusters = coarse_clusters(batches, columns, threads);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
-  c.cluster_pairs = count_cluster_pairs(number_cluster_pairs(batches, clusters));
+  c.cluster_pairs = count_cluster_pairs(clusters.pairs);
   return c;
 }
 
@@ -157,11 +178,15 @@ Plan plan_solver(const WorkCounts& c) {
                             " iterative explicit, " + milliseconds(implicit_cg) +
                             " iterative implicit";
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
+  if (too_long)
+    return {SolverKind::implicit_cg, counts + ": a point is seen " +
+                                         std::to_string(c.longest_track) +
+                                         " times, too often to form the camera matrix"};
   // Exact steps are fewer: conjugate gradients must save something that can be felt.
   const double iterative = std::min(explicit_cg, implicit_cg) + kWorthIterating;
-  if (std::min(dense, sparse) <= iterative && !too_long)
+  if (std::min(dense, sparse) <= iterative)
     return {sparse < dense ? SolverKind::sparse : SolverKind::dense, counts + costs};
-  if (explicit_cg <= implicit_cg && !too_long) return {SolverKind::explicit_cg, counts + costs};
+  if (explicit_cg <= implicit_cg) return {SolverKind::explicit_cg, counts + costs};
   return {SolverKind::implicit_cg, counts + costs};
 }
 
@@ -187,34 +212,5 @@ bool has_mixed(SolverKind kind) {
 }
 
 bool prefers_mixed(SolverKind kind) { return has_mixed(kind); }
-
-std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads) {
-  const SolverKind kind = plan.kind;
-  const bool pairs = kind != SolverKind::blocks && kind != SolverKind::implicit_cg;
-  const std::uint64_t tiles = pairs ? c.tiles : 0;
-  const auto slices = static_cast<std::uint64_t>(
-      count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
-  std::uint64_t sum = c.batches * (32 + 4 + 128) + c.groups * (16 + 32);
-  if (c.weighted) sum += c.batches * 64;
-  sum += c.groups * 8 * (2 * kPointGroup + kFactorGroup);
-  sum += c.images * (8 * 2 * kCameraRecord + 2 * 56 + 2 * 24 + 36 + 4) + 5 * 8 * c.columns;
-  sum += slices * 8 * (kTileDoubles * tiles + kDiagonalDoubles * c.images);
-  sum += static_cast<std::uint64_t>(threads) * 8 * 8 *
-         (48 * std::max<std::uint64_t>(Chunks::kBatchesPerChunk, c.longest_track) +
-          57 * std::uint64_t(c.longest_track));
-  if (pairs) sum += 4 * c.pairs + 8 * tiles + 6 * c.observations;
-  if (kind == SolverKind::dense) sum += 8 * c.columns * (c.columns + 8);
-  if (kind == SolverKind::sparse) sum += c.sparse_bytes;
-  if (kind == SolverKind::explicit_cg)
-    sum += (2 * tiles + c.images) * (8 * kBlockEntry + 20) + 256 * c.images;
-  if (kind == SolverKind::implicit_cg)
-    sum += slices * 8 * kProductRecord * c.images +
-           (plan.mixed ? slices * 8 * kProductRecord + 4 * kFloatCameraRecord : 0) * c.images;
-  if (kind != SolverKind::dense && kind != SolverKind::sparse)
-    sum += c.images * (81 * 8 + 80) + 32 * c.columns + 256 * c.images;
-  if ((kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg) && c.clusters > 0)
-    sum += CoarseSpace::bytes(c.images, c.clusters, c.cluster_pairs, slices);
-  return sum;
-}
 
 }  // namespace sheaf

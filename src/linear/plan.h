@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <string>
 
+#include "linear/clusters.h"
 #include "linear/columns.h"
+#include "platform/parallel.h"
 #include "residual/batches.h"
 
 namespace sheaf {
@@ -23,23 +25,30 @@ struct WorkCounts {
   std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
   double sparse_flops = 0;
-  std::uint64_t sparse_doubles = 0, sparse_bytes = 0;
+  std::uint64_t sparse_doubles = 0;
+  std::uint64_t sparse_bytes = 0;  ///< beside these
   /// Of the coarse space of the iterative solvers; 0: none.
   std::uint64_t clusters = 0, cluster_pairs = 0;
   std::uint32_t longest_track = 0;
+  std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
+  bool lens_shared = false;
   bool images_couple = true;  ///< some free point or shared lens couples images
   bool weighted = false;      ///< a loss leaves a weight for each observation
+  bool dogleg = false;        ///< the gradient is summed by image, steps are blended
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
 };
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held);
+/// Also finds the clusters of the coarse space.
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
+                      Clusters& clusters, Threads& threads);
 
 /// A solver and, in one line, why it was taken.
 struct Plan {
   SolverKind kind = SolverKind::dense;
   std::string reason;
-  bool mixed = false;  ///< float inside the solver
+  bool mixed = false;   ///< float inside the solver
+  Clusters clusters{};  ///< of an iterative solver's coarse space, as count_work finds them
 };
 
 /// Whether the solver has a variant with float inside, and whether that is the quicker one: a pure
@@ -52,9 +61,6 @@ Plan plan_solver(const WorkCounts& counts);
 
 /// The cheaper of the two iterative ones.
 SolverKind cheaper_iterative(const WorkCounts& counts);
-
-/// Bytes that the system will hold with this solver, what the batches hold included.
-std::uint64_t forecast_bytes(const WorkCounts& counts, const Plan& plan, int threads);
 
 /// Flops to linearise so many batches and to multiply so many pairs.
 double linearize_flops(std::uint64_t batches, std::uint64_t pairs);

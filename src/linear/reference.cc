@@ -8,92 +8,11 @@
 #include <cmath>
 #include <vector>
 
-#include "geometry/bal_camera.h"
 #include "linear/kernel_table.h"
+#include "linear/reference_rows.h"
 
 namespace sheaf {
 namespace {
-
-struct Observed {
-  Matrix3<double> R;
-  Vector3<double> t;
-  BalCamera<double> camera;
-};
-
-Observed camera_of(const double* cameras, std::uint32_t image) {
-  const double* c = cameras + kCameraRecord * image;
-  Observed o;
-  std::copy(c, c + 9, o.R.begin());
-  std::copy(c + 9, c + 12, o.t.begin());
-  o.camera = {c[12], c[13], c[14]};
-  return o;
-}
-
-Vector3<double> point_of(const double* points, std::size_t group, std::uint32_t lane) {
-  const double* X = points + kPointGroup * group + lane;
-  return {X[0], X[8], X[16]};
-}
-
-/// One observation with its residual and the exact Jacobians.
-struct Row {
-  std::array<double, 2> r;
-  BalJacobian<double> j;
-
-  double square() const { return r[0] * r[0] + r[1] * r[1]; }
-  /// Times sqrt(rho'); returns rho of what it was.
-  LossValue<double> apply(const ScaledLoss& loss) {
-    const LossValue<double> rho = evaluate_loss(loss, square());
-    scale(std::sqrt(rho.first));
-    return rho;
-  }
-  void scale(double by) {
-    for (double& x : r) x *= by;
-    for (double& x : j.camera) x *= by;
-    for (double& x : j.point) x *= by;
-  }
-};
-
-Row row_of(const Batches& batches, const double* cameras, const Vector3<double>& X,
-           std::uint64_t batch, std::uint32_t lane) {
-  const Observed o = camera_of(cameras, batches.image[8 * batch + lane]);
-  Row row;
-  row.j = project_with_jacobian(o.R, o.t, o.camera, X);
-  row.r = {row.j.pixel[0] - batches.xy[16 * batch + lane],
-           row.j.pixel[1] - batches.xy[16 * batch + 8 + lane]};
-  return row;
-}
-
-/// Lower factor L of V + D, with the solve by L.
-struct Factor3 {
-  double l00 = 0, l10 = 0, l20 = 0, l11 = 0, l21 = 0, l22 = 0;
-  bool held = false;
-
-  static Factor3 of(const std::array<double, 9>& A) {
-    Factor3 f;
-    f.l00 = std::sqrt(A[0]);
-    f.l10 = A[3] / f.l00;
-    f.l20 = A[6] / f.l00;
-    f.l11 = std::sqrt(A[4] - f.l10 * f.l10);
-    f.l21 = (A[7] - f.l10 * f.l20) / f.l11;
-    f.l22 = std::sqrt(A[8] - f.l20 * f.l20 - f.l21 * f.l21);
-    return f;
-  }
-  Vector3<double> forward(const double* s) const {
-    if (held) return {0, 0, 0};
-    Vector3<double> y;
-    y[0] = s[0] / l00;
-    y[1] = (s[1] - l10 * y[0]) / l11;
-    y[2] = (s[2] - l20 * y[0] - l21 * y[1]) / l22;
-    return y;
-  }
-  Vector3<double> backward(const Vector3<double>& y) const {
-    Vector3<double> x;
-    x[2] = y[2] / l22;
-    x[1] = (y[1] - l21 * x[2]) / l11;
-    x[0] = (y[0] - l10 * x[1] - l20 * x[2]) / l00;
-    return x;
-  }
-};
 
 void store_factor(const Factor3& f, const Vector3<double>& w, const Vector3<double>& D,
                   double* out) {
@@ -131,7 +50,7 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   const Batches::Group& group = in.batches->groups[g];
   const Vector3<double> X = point_of(in.points, g, lane);
   std::array<double, 9> A{};
-  Vector3<double> gradient{}, D;
+  Vector3<double> gradient{};
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
@@ -147,10 +66,19 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
         for (int k = 0; k < 3; ++k) A[3 * i + k] += row.j.point[3 * e + i] * row.j.point[3 * e + k];
       }
   }
-  for (int i = 0; i < 3; ++i) {
-    D[i] = in.damping * std::clamp(A[4 * i], kDiagonalFloor, kDiagonalCeiling);
-    A[4 * i] += D[i];
+  const PointCoordinates at(in.chart, base_of(in.chart, *in.batches, group, lane, in.cameras), X);
+  const Vector3<double> V = at.diagonal(A);
+  Vector3<double> D;
+  for (int i = 0; i < 3; ++i)
+    D[i] = in.damping * std::clamp(V[i], kDiagonalFloor, kDiagonalCeiling);
+  if (!at.plain()) {
+    const double least = in.chart.rounding * in.chart.unit;
+    D[2] = std::max(D[2], least * least * at.chart.reach2 * (V[0] + V[1]));
+    const bool far = !in.chart.crosses && at.chart.reach * in.chart.unit > kBound;
+    if (far && at.chart.transpose(gradient)[2] > 0)
+      D[2] = std::max(D[2], kAtBound * std::clamp(V[2], kDiagonalFloor, kDiagonalCeiling));
   }
+  at.damp(D, 1, A);
   Factor3 f = Factor3::of(A);
   f.held = in.points_held;
   const Vector3<double> w = f.forward(gradient.data());
@@ -241,91 +169,6 @@ void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, dou
   }
 }
 
-/// Jc dc, from the step in the camera record: phi, rho, df, k1 df + f dk1, k2 df + f dk2.
-std::array<double, 2> camera_motion(const Row& row, const double* record) {
-  const double* s = record + camera_record::kStep;
-  const double f = record[12];
-  const double dk1 = (s[7] - record[13] * s[6]) / f, dk2 = (s[8] - record[14] * s[6]) / f;
-  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6], dk1, dk2};
-  std::array<double, 2> e{};
-  for (int r = 0; r < 2; ++r)
-    for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];
-  return e;
-}
-
-double weight_of(const double* weights, std::uint64_t batch, std::uint32_t lane) {
-  return weights == nullptr ? 1 : weights[8 * batch + lane];
-}
-
-/// s += Jp^T w e.
-void add_to_point(const Row& row, double w, const std::array<double, 2>& e, Vector3<double>& s) {
-  for (int i = 0; i < 3; ++i) s[i] += w * (row.j.point[i] * e[0] + row.j.point[3 + i] * e[1]);
-}
-
-Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {
-  const auto at = [&](int i) { return factor[8 * i]; };
-  const double u0 = s[0] * at(0);
-  const double u1 = (s[1] - at(1) * u0) * at(3);
-  const double u2 = (s[2] - at(2) * u0 - at(4) * u1) * at(5);
-  const double v0 = at(6) - u0, v1 = at(7) - u1, v2 = at(8) - u2;
-  Vector3<double> d;
-  d[2] = v2 * at(5);
-  d[1] = (v1 - at(4) * d[2]) * at(3);
-  d[0] = (v0 - at(1) * d[1] - at(2) * d[2]) * at(0);
-  return d;
-}
-
-struct PointCost {
-  double square = 0, cost = 0;
-  Matrix3<double> V{};
-  Vector3<double> g{};
-};
-
-PointCost cost_of(const TrialInput& in, const Batches::Group& group, const Vector3<double>& X,
-                  std::uint32_t lane) {
-  PointCost out;
-  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-    Row row = row_of(*in.batches, in.trial_cameras, X, b, lane);
-    out.square += row.square();
-    out.cost += row.apply(in.loss).value;
-    for (int r = 0; r < 2; ++r) {
-      const double* J = &row.j.point[3 * r];
-      for (int i = 0; i < 3; ++i) {
-        out.g[i] -= J[i] * row.r[r];
-        for (int k = 0; k < 3; ++k) out.V[3 * i + k] += J[i] * J[k];
-      }
-    }
-  }
-  return out;
-}
-
-/// Inner iterations (kernels.h) of one point from X; returns the cost where it ends.
-PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::uint32_t lane,
-                       const double* factor, Vector3<double>& X) {
-  PointCost best = cost_of(in, group, X, lane);
-  const double mean = in.mean_square * group.track;
-  for (int step = 0; step < in.inner_iterations; ++step) {
-    Matrix3<double> A = best.V;
-    for (int i = 0; i < 3; ++i) A[4 * i] += inner_iterations::kDamping * factor[8 * (9 + i)];
-    const Factor3 f = Factor3::of(A);
-    const Vector3<double> w = f.forward(best.g.data());
-    const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-    if (!(decrease > inner_iterations::kWorthOne * mean)) break;
-    const Vector3<double> d = f.backward(w);
-    const Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
-    const PointCost there = cost_of(in, group, Y, lane);
-    if (!(there.cost < best.cost)) break;
-    X = Y, best = there;
-    if (!(decrease > inner_iterations::kWorthMore * mean)) break;
-  }
-  return best;
-}
-
-double depth(const double* cameras, std::uint32_t image, const Vector3<double>& X) {
-  const Observed o = camera_of(cameras, image);
-  return multiply(o.R, X)[2] + o.t[2];
-}
-
 /// Every ordered pair of records of a point, as it stands in the text.
 void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
             const CoarseInput& in, double*, double* sums) {
@@ -353,46 +196,6 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
                                    projected(first + 8 * b, image_b, q, n);
         }
   }
-}
-
-void trial_point(const TrialInput& in, std::size_t g, std::uint32_t lane, TrialOutput& out) {
-  const Batches& batches = *in.batches;
-  const Batches::Group& group = batches.groups[g];
-  const bool real = lane < group.lanes;
-  const Vector3<double> X = point_of(in.points, g, lane);
-  Vector3<double> s{};
-  for (std::uint32_t o = 0; o < group.track; ++o) {
-    const std::uint64_t b = group.first_batch + o;
-    const Row row = row_of(batches, in.cameras, X, b, lane);
-    const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
-    add_to_point(row, weight_of(in.weights, b, lane), e, s);
-  }
-  const double* factor = in.factors + kFactorGroup * g + lane;
-  const Vector3<double> d = real ? back_substitute(factor, s) : Vector3<double>{};
-  Vector3<double> Y{X[0] + d[0], X[1] + d[1], X[2] + d[2]};
-  const PointCost cost = real ? refine_point(in, group, lane, factor, Y) : PointCost();
-  double d2 = 0, x2 = 1e-300;
-  for (int i = 0; i < 3; ++i) {
-    out.points[kPointGroup * g + 8 * i + lane] = Y[i];
-    d2 += (Y[i] - X[i]) * (Y[i] - X[i]), x2 += X[i] * X[i];
-    if (real) out.damping_term += d[i] * d[i] * factor[8 * (9 + i)];
-  }
-  if (!real) return;
-  out.step2_max = std::max(out.step2_max, d2 / x2);
-  out.square_sum += cost.square;
-  if (in.loss.kind != LossKind::none) out.loss_sum += cost.cost;
-  for (std::uint32_t o = 0; o < group.track; ++o) {
-    const std::uint64_t b = group.first_batch + o;
-    const std::uint32_t image = batches.image[8 * b + lane];
-    if (in.count_newly_behind && depth(in.trial_cameras, image, Y) > 0 &&
-        depth(in.cameras, image, X) <= 0)
-      ++out.newly_behind;
-  }
-}
-
-void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
-    for (std::uint32_t l = 0; l < 8; ++l) trial_point(in, g, l, out);
 }
 
 void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, double* y) {
@@ -491,9 +294,9 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
 }  // namespace
 
 const Kernels& reference_kernels() {
-  static const Kernels kernels{"reference",    false,      &linearize,  &diagonal,
-                               &pairs,         &coarse,    &trial,      &product,
-                               &product_float, &residuals, &square_sum, &count_behind};
+  static const Kernels kernels{"reference",    false,      &linearize,          &diagonal,
+                               &pairs,         &coarse,    &trial_by_reference, &product,
+                               &product_float, &residuals, &square_sum,         &count_behind};
   return kernels;
 }
 

@@ -24,6 +24,9 @@ static_assert(kRowBatch == kRowPart * kParts);
 
 void eliminate_rows(const StoredRowsInput& in, const Chunk& chunk, const Records& records,
                     EliminateOutput& out) {
+  EliminateInput settings{};
+  settings.damping = in.damping;
+  settings.points_held = in.points_held;
   EliminateSums sums;
   for (int p = 0; p < kParts; ++p) sums.decrease[p] = sums.gradient2[p] = zero();
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
@@ -34,8 +37,9 @@ void eliminate_rows(const StoredRowsInput& in, const Chunk& chunk, const Records
       PointSums p;
       p.clear();
       for (std::uint32_t o = 0; o < group.track; ++o) p.add(restore(rows + kRowBatch * o));
-      finish_group(p, {in.damping, in.points_held, group.track, g, part}, rows, kRowBatch,
-                   records.T + kTRecord * record, records.C + kCRecord * record, out, sums);
+      const LaneChart none{};
+      finish_group<false>(settings, p, none, {group.track, g, part}, rows, kRowBatch,
+                          records.T + kTRecord * record, records.C + kCRecord * record, out, sums);
     }
   }
   out.point_decrease += sum_parts(sums.decrease);

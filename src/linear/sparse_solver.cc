@@ -93,6 +93,8 @@ class SparseSolver : public CameraSolver {
     const SymbolicFactor& symbolic = cholesky_.symbolic();
     std::vector<Piece> pieces;
     std::vector<std::int32_t> owner;
+    pieces.reserve(tiles_ + parts_.parts.size());  // exact where no image shares a lens
+    owner.reserve(pieces.capacity());
     const auto couple = [&](std::uint32_t from, std::uint32_t a, std::uint32_t b) {
       const std::int32_t row = graph.columns[graph.first[parts_.parts[a].node]];
       const std::int32_t column = graph.columns[graph.first[parts_.parts[b].node]];

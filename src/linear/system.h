@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 #include "geometry/loss.h"
 
@@ -15,6 +16,10 @@ struct StepRequest {
   ScaledLoss loss{};     ///< of the held state's cost, of the step and of its trial
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
   bool precise = false;  ///< solve in double, even where float would do for the way there
+  /// Keep what a smaller radius at the same state needs, and the trial within the radius.
+  bool dogleg = false;
+  /// Of the step in the metric C = clamp(diag(J^T J)): |s|_C = sqrt(s^T C s), px.
+  double radius = std::numeric_limits<double>::infinity();
 };
 
 /// A damped Gauss-Newton step was computed (or not), points eliminated, from the held state.
@@ -25,6 +30,7 @@ struct Step {
   double plain_cost = 0;    ///< 1/2 sum |r|^2 there
   double gradient_max = 0;  ///< px: largest |J_i^T r| / |J_i| over the free columns
   int linear_iterations = 0;
+  bool reused = false;  ///< nothing was linearised or factored: only the radius is new
 };
 
 /// The state that the step leads to.
@@ -35,18 +41,22 @@ struct Trial {
   double step_norm = 0;           ///< largest relative change of any one block
   std::uint64_t newly_behind = 0;  ///< observations that went behind their camera (if watched)
   double motion_px = 0;            ///< median move in the images, where there are images
+  // Of a dogleg:
+  double length = 0;   ///< |s|_C of the step that was tried
+  double damping = 0;  ///< for which the step is, or comes nearest to being, the damped one
 };
 
 /// The one seam between the trust region and everything below it. Only scalars cross: state and
 /// vectors live behind it, wherever that is. The loop above calls
-///   propose(request) -> trial() -> accept() or propose(with more damping) -> ...
+///   propose(request) -> trial() -> accept() or propose(with more damping, less radius) -> ...
 class System {
  public:
   virtual ~System() = default;
 
   /// Linearises at the held state, eliminates the points under (J^T J + damping diag(J^T J)) and
   /// solves for the cameras. Asked again without accept(), the state is the same and only the
-  /// damping differs.
+  /// damping differs. Asked again for a dogleg of which the radius alone is new, it does none of
+  /// this: what is known of the model serves any radius.
   virtual Step propose(const StepRequest& request) = 0;
 
   /// Back-substitutes the points and evaluates the cost at the stepped state, in one pass.

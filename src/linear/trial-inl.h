@@ -110,6 +110,23 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   return sum;
 }
 
+/// gradient = L w = -Jp^T r, and lambda D^-1 of it.
+HWY_INLINE void descend_point(const double* pd, V lambda, V* gradient, V* step) {
+  const Factor f = load_factor(pd);
+  const V w0 = load(pd + 48), w1 = load(pd + 56), w2 = load(pd + 64);
+  gradient[0] = hn::Div(w0, f.i00);
+  gradient[1] = fma(f.l10, w0, hn::Div(w1, f.i11));
+  gradient[2] = fma(f.l20, w0, fma(f.l21, w1, hn::Div(w2, f.i22)));
+  for (int i = 0; i < 3; ++i)
+    step[i] = hn::Div(hn::Mul(lambda, gradient[i]), load(pd + 8 * (9 + i)));
+}
+
+HWY_INLINE void blend_step(const PointBlend& blend, const double* pd, V* d) {
+  V gradient[3], descent[3];
+  descend_point(pd, set(blend.descent), gradient, descent);
+  for (int i = 0; i < 3; ++i) d[i] = fma(set(blend.newton), d[i], descent[i]);
+}
+
 /// Sum |r|^2 of a track, and sum rho(|r|^2): the same without a loss.
 struct TrackCost {
   V square, cost;
@@ -122,9 +139,11 @@ struct Refined {
 };
 
 /// One pass over a group's observations at X: their cost and, if asked for, the point's sums.
+/// chart: of the points' sums; nullptr: by X, Y, Z.
 template <bool Robust, bool kLinearize>
 HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& group, int lane, V X0,
-                                V X1, V X2, PointSums& sums) {
+                                V X1, V X2, [[maybe_unused]] const LaneChart* chart,
+                                PointSums& sums) {
   const Batches& batches = *in.batches;
   V square = zero(), cost = zero();
   if (kLinearize) sums.clear();
@@ -137,6 +156,8 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
       // Summed as below: which way a lane goes depends on its neighbours, its bits must not.
       square = hn::Add(square, fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
       if constexpr (Robust) cost = hn::Add(cost, apply_loss(in.loss, j).value);
+      if (chart != nullptr)
+        for (V* row : {j.point[0], j.point[1]}) chart->transpose(row);
       sums.add(j);
     } else {
       const V r2 = squared_residual(c, see(c, X0, X1, X2), load(z), load(z + 8));
@@ -147,18 +168,46 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
   return {square, Robust ? cost : square};
 }
 
-/// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
-/// worth a pass and lower that point's own cost (kernels.h, inner_iterations).
+/// Points of a chart that their step has lost (kernels.h, kLost) go back to `stay`, where that is
+/// better.
 template <bool Robust>
+HWY_INLINE void recover_points(const TrialInput& in, const Batches::Group& group, int lane, V mask,
+                               const V* base, const V* stay, LaneChart& chart, PointSums& p,
+                               Refined& best) {
+  const V most = set(inner_iterations::kLost * in.mean_square * group.track);
+  const auto sound = hn::Or(hn::Eq(mask, zero()), hn::Le(best.at.cost, most));
+  if (hn::AllTrue(D(), sound)) return;
+  const V Y0 = hn::IfThenElse(sound, best.X0, stay[0]),
+          Y1 = hn::IfThenElse(sound, best.X1, stay[1]),
+          Y2 = hn::IfThenElse(sound, best.X2, stay[2]);
+  const TrackCost there = pass_group<Robust, false>(in, group, lane, Y0, Y1, Y2, nullptr, p);
+  // Not finite is not less.
+  const auto keep = hn::Or(sound, hn::Le(best.at.cost, there.cost));
+  best.X0 = hn::IfThenElse(keep, best.X0, Y0);
+  best.X1 = hn::IfThenElse(keep, best.X1, Y1);
+  best.X2 = hn::IfThenElse(keep, best.X2, Y2);
+  chart.place(in.chart, best.X0, best.X1, best.X2, base);
+  best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, &chart, p);
+}
+
+/// Gauss-Newton steps of each point by itself with the stepped cameras held, as long as they are
+/// worth a pass and lower that point's own cost (kernels.h, inner_iterations). base: of the charts,
+/// where the stepped cameras have it; stay: the points, had they only followed it.
+template <bool Robust, bool Charted>
 HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group, int lane,
-                              const double* pd, V mask, Refined& best) {
+                              const double* pd, V mask, [[maybe_unused]] const V* base,
+                              [[maybe_unused]] const V* stay, Refined& best) {
+  LaneChart chart;
+  const LaneChart* const used = Charted ? &chart : nullptr;
+  if constexpr (Charted) chart.place(in.chart, best.X0, best.X1, best.X2, base);
   PointSums p;
-  best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, p);
+  best.at = pass_group<Robust, true>(in, group, lane, best.X0, best.X1, best.X2, used, p);
   auto active = hn::Gt(mask, zero());
+  if constexpr (Charted) recover_points<Robust>(in, group, lane, mask, base, stay, chart, p, best);
   const double mean = in.mean_square * group.track;
   const V worth_one = set(inner_iterations::kWorthOne * mean);
   const V worth_more = set(inner_iterations::kWorthMore * mean);
-  const V weak = set(inner_iterations::kDamping);
+  const V weak = set(in.blend.inner_damping);
   for (int steps_left = in.inner_iterations; steps_left > 0;) {
     const Factor f =
         factor3(fma(weak, load(pd + 72), p.v00), p.v01, p.v02, fma(weak, load(pd + 80), p.v11),
@@ -171,9 +220,17 @@ HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group,
     if (hn::AllFalse(D(), active)) return;
     const auto far = hn::And(active, hn::Gt(decrease, worth_more));
     steps_left = hn::AllFalse(D(), far) ? 0 : steps_left - 1;
-    const V Y0 = hn::Add(best.X0, d[0]), Y1 = hn::Add(best.X1, d[1]), Y2 = hn::Add(best.X2, d[2]);
-    const TrackCost at = steps_left > 0 ? pass_group<Robust, true>(in, group, lane, Y0, Y1, Y2, p)
-                                        : pass_group<Robust, false>(in, group, lane, Y0, Y1, Y2, p);
+    V Y0 = hn::Add(best.X0, d[0]), Y1 = hn::Add(best.X1, d[1]), Y2 = hn::Add(best.X2, d[2]);
+    if constexpr (Charted) {
+      V step[3], to[3];
+      chart.apply(d, step);
+      chart.retract(in.chart, step, to);
+      Y0 = hn::Add(base[0], to[0]), Y1 = hn::Add(base[1], to[1]), Y2 = hn::Add(base[2], to[2]);
+      chart.place(in.chart, Y0, Y1, Y2, base);
+    }
+    const TrackCost at = steps_left > 0
+                             ? pass_group<Robust, true>(in, group, lane, Y0, Y1, Y2, used, p)
+                             : pass_group<Robust, false>(in, group, lane, Y0, Y1, Y2, used, p);
     active = hn::And(active, hn::Lt(at.cost, best.at.cost));
     best = {hn::IfThenElse(active, Y0, best.X0),
             hn::IfThenElse(active, Y1, best.X1),
@@ -201,7 +258,41 @@ HWY_INLINE V count_crossed(const TrialInput& in, const Batches::Group& group, in
   return behind;
 }
 
-template <bool Robust>
+/// The step of a part's points in their charts.
+struct ChartedStep {
+  V base[3], moved[3];  ///< of the charts, before and after the cameras stepped
+  V stay[3];            ///< the points, had they only followed it
+  LaneChart from;
+
+  /// d: by X, Y, Z. Returns q^T D q of its coordinates q.
+  HWY_INLINE V take(const TrialInput& in, const Batches::Group& group, int lane, const double* pd,
+                    V mask, const V* X, const V* d, Refined& y) {
+    load_base(in.chart, *in.batches, group.first_batch, lane, in.cameras, base);
+    load_base(in.chart, *in.batches, group.first_batch, lane, in.trial_cameras, moved);
+    from.place(in.chart, X[0], X[1], X[2], base);
+    V q[3], e[3], to[3], damping = zero();
+    from.coordinates(d, q);
+    for (int i = 0; i < 3; ++i) {
+      damping = fma(hn::Mul(q[i], q[i]), load(pd + 8 * (9 + i)), damping);
+      e[i] = hn::Sub(d[i], hn::Sub(moved[i], base[i]));
+      stay[i] = hn::Add(moved[i], from.Y[i]);
+    }
+    from.retract(in.chart, e, to);
+    const auto real = hn::Gt(mask, zero());
+    y.X0 = hn::IfThenElse(real, hn::Add(moved[0], to[0]), X[0]);
+    y.X1 = hn::IfThenElse(real, hn::Add(moved[1], to[1]), X[1]);
+    y.X2 = hn::IfThenElse(real, hn::Add(moved[2], to[2]), X[2]);
+    return damping;
+  }
+
+  /// Size of the step to y, refined or not.
+  HWY_INLINE V size2(const TrialInput& in, V mask, const Refined& y) const {
+    const V Y[3] = {hn::Sub(y.X0, moved[0]), hn::Sub(y.X1, moved[1]), hn::Sub(y.X2, moved[2])};
+    return hn::IfThenElseZero(hn::Gt(mask, zero()), chart_step2_lanes(in.chart, from, Y));
+  }
+};
+
+template <bool Robust, bool Charted>
 HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, std::size_t g,
                            int part, double* stepped, TrialSums& sums) {
   const Batches& batches = *in.batches;
@@ -220,13 +311,16 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   const V mask = lane_mask(group.lanes, lane);
   if (group.lanes < 8)  // masked lanes stay where they are
     for (V& x : s) x = hn::Mul(x, mask);
-  const V damping = back_substitute(pd, s, d);
+  V damping = back_substitute(pd, s, d);
+  if (!in.blend.plain()) blend_step(in.blend, pd, d);
   Refined y{hn::Add(X[0], d[0]), hn::Add(X[1], d[1]), hn::Add(X[2], d[2]), {zero(), zero()}};
+  [[maybe_unused]] ChartedStep charted;
+  if constexpr (Charted) damping = charted.take(in, group, lane, pd, mask, X, d, y);
   PointSums unused;
   if (in.inner_iterations > 0)
-    refine_points<Robust>(in, group, lane, pd, mask, y);
+    refine_points<Robust, Charted>(in, group, lane, pd, mask, charted.moved, charted.stay, y);
   else
-    y.at = pass_group<Robust, false>(in, group, lane, y.X0, y.X1, y.X2, unused);
+    y.at = pass_group<Robust, false>(in, group, lane, y.X0, y.X1, y.X2, nullptr, unused);
   double* Y = stepped + kPointGroup * g + lane;
   store(y.X0, Y), store(y.X1, Y + 8), store(y.X2, Y + 16);
   const V d0 = hn::Sub(y.X0, X[0]), d1 = hn::Sub(y.X1, X[1]), d2 = hn::Sub(y.X2, X[2]);
@@ -235,12 +329,14 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   sums.square[part] = fma(y.at.square, mask, sums.square[part]);
   if (Robust) sums.loss[part] = fma(y.at.cost, mask, sums.loss[part]);
   sums.damping[part] = fma(damping, mask, sums.damping[part]);
-  sums.step2[part] = hn::Max(sums.step2[part], hn::Div(moved, x2));
+  V step2 = hn::Div(moved, x2);
+  if constexpr (Charted) step2 = charted.size2(in, mask, y);
+  sums.step2[part] = hn::Max(sums.step2[part], step2);
   if (in.count_newly_behind)
     sums.behind[part] = fma(count_crossed(in, group, lane, X, y), mask, sums.behind[part]);
 }
 
-template <bool Robust>
+template <bool Robust, bool Charted>
 inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
   TrialSums sums;
   for (int p = 0; p < kParts; ++p)
@@ -249,7 +345,7 @@ inline void trial_chunk(const TrialInput& in, const Chunk& chunk, TrialOutput& o
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     prefetch_groups(in.points, in.factors, 12, g + 1, std::min<std::size_t>(g + 2, groups));
     for (int p = 0; p < kParts; ++p)
-      trial_part<Robust>(in, in.batches->groups[g], g, p, out.points, sums);
+      trial_part<Robust, Charted>(in, in.batches->groups[g], g, p, out.points, sums);
   }
   out.square_sum += sum_parts(sums.square);
   if (Robust) out.loss_sum += sum_parts(sums.loss);

@@ -4,14 +4,11 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <new>
 #include <type_traits>
 
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
+#include "platform/pages.h"
 
 namespace sheaf {
 
@@ -30,14 +27,9 @@ class Buffer {
     data_.reset();
     size_ = 0;
     if (size == 0) return;
-    // Of a large array, touching 4 KiB at a time for the first time costs more than filling it.
-    const std::size_t alignment = size * sizeof(T) >= kLarge ? kHugePage : 64;
-    const std::size_t bytes = (size * sizeof(T) + alignment - 1) / alignment * alignment;
-    data_.reset(static_cast<T*>(std::aligned_alloc(alignment, bytes)));
-    if (!data_) throw std::bad_alloc();
-#if defined(__linux__)
-    if (alignment == kHugePage) (void)::madvise(data_.get(), bytes, MADV_HUGEPAGE);
-#endif
+    if (size > SIZE_MAX / 2 / sizeof(T)) throw std::bad_alloc();
+    const std::size_t bytes = size * sizeof(T);
+    data_ = {static_cast<T*>(allocate_pages(bytes)), Free{bytes}};
     size_ = size;
   }
   void fill(T value) { std::fill(begin(), end(), value); }
@@ -54,9 +46,9 @@ class Buffer {
   std::size_t bytes() const { return size_ * sizeof(T); }
 
  private:
-  static constexpr std::size_t kLarge = std::size_t(1) << 19, kHugePage = std::size_t(2) << 20;
   struct Free {
-    void operator()(T* p) const { std::free(p); }
+    std::size_t bytes = 0;
+    void operator()(T* p) const { free_pages(p, bytes); }
   };
   std::unique_ptr<T, Free> data_;
   std::size_t size_ = 0;

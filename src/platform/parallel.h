@@ -84,6 +84,13 @@ class Threads {
 #endif
   }
 
+  /// task(first, end) for consecutive parts of [0, size), which do not depend on count().
+  template <class Task>
+  void for_ranges(std::size_t size, std::size_t each, const Task& task) {
+    for_each((size + each - 1) / each,
+             [&](std::size_t t) { task(t * each, std::min(size, (t + 1) * each)); });
+  }
+
  private:
   int count_;
   std::optional<oneapi::tbb::global_control> allowed_;

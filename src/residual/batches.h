@@ -10,6 +10,8 @@
 
 namespace sheaf {
 
+class Threads;
+
 /// Observations arranged for eight lanes. Points are sorted by track length and then by the images
 /// that see them; a group is eight points of one track length; a batch is one observation of each
 /// of its eight points. So sums over a point's track need no scatter, and most batches see one
@@ -33,14 +35,18 @@ struct Batches {
 
 /// Arranges the observations of a valid problem; those with skip[i] != 0 are left out (skip may be
 /// empty). Points that nobody sees are in no group.
+Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip, Threads& threads);
 Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip = {});
 
-/// Calls visit(images) with the images of a point's track, in order, for every point whose images
-/// are not those of the point before: points are sorted by them, so few sets come twice.
+/// Calls visit(images) with the images of a point's track, in order, for every point of the groups
+/// [first_group, end_group) whose images are not those of the point before: points are sorted by
+/// them, so few sets come twice.
 template <class Visit>
-void for_each_image_set(const Batches& batches, const Visit& visit) {
+void for_each_image_set(const Batches& batches, std::size_t first_group, std::size_t end_group,
+                        const Visit& visit) {
   std::vector<std::uint32_t> previous, set;
-  for (const Batches::Group& group : batches.groups) {
+  for (std::size_t g = first_group; g < end_group; ++g) {
+    const Batches::Group& group = batches.groups[g];
     const std::uint64_t end = group.first_batch + group.track;
     bool uniform = true;
     for (std::uint64_t b = group.first_batch; b < end; ++b) uniform &= batches.uniform[b] >= 0;

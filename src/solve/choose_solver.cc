@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "solve/choose_solver.h"
 
+#include <algorithm>
 #include <string>
 
 #include "linear/chunks.h"
+#include "linear/forecast.h"
 
 namespace sheaf {
 namespace {
@@ -29,8 +31,14 @@ Plan asked_for(const WorkCounts& counts, CameraSolverKind kind) {
   return {cheaper_iterative(counts), asked + ", " + plan.reason};
 }
 
-bool takes_mixed(SolverKind kind, Precision precision) {
-  switch (precision) {
+/// A far point's parallax is lost among the roundings of its float products (docs/math.md, section
+/// 7): measured, steps then fail that double makes.
+bool loses_parallax(SolverKind kind, PointParametrisation points) {
+  return kind == SolverKind::implicit_cg && points != PointParametrisation::xyz;
+}
+
+bool takes_mixed(SolverKind kind, const SolveOptions& options) {
+  switch (options.precision) {
     case Precision::full:
       return false;
     case Precision::mixed:
@@ -38,7 +46,7 @@ bool takes_mixed(SolverKind kind, Precision precision) {
     case Precision::automatic:
       break;
   }
-  return prefers_mixed(kind);
+  return prefers_mixed(kind) && !loses_parallax(kind, options.points);
 }
 
 std::string megabytes(std::uint64_t bytes) {
@@ -48,7 +56,7 @@ std::string megabytes(std::uint64_t bytes) {
 }  // namespace
 
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
-                             std::uint64_t resident_bytes) {
+                             const MemoryHeld& held) {
   Choice choice{asked_for(counts, options.solver), 0};
   const bool forms_pairs =
       choice.plan.kind != SolverKind::blocks && choice.plan.kind != SolverKind::implicit_cg;
@@ -58,14 +66,13 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
                                        std::to_string(Chunks::kLongestTrack) +
                                        ": use the implicit iterative solver");
   const auto forecast = [&](const Plan& plan) {
-    return resident_bytes + forecast_bytes(counts, plan, threads);
+    return std::max(held.peak_bytes, held.resident_bytes + forecast_bytes(counts, plan, threads));
   };
-  choice.plan.mixed = takes_mixed(choice.plan.kind, options.precision);
+  choice.plan.mixed = takes_mixed(choice.plan.kind, options);
   choice.forecast_bytes = forecast(choice.plan);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
-  Plan leanest{SolverKind::implicit_cg, "",
-               takes_mixed(SolverKind::implicit_cg, options.precision)};
+  Plan leanest{SolverKind::implicit_cg, "", takes_mixed(SolverKind::implicit_cg, options)};
   const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
       lean <= options.memory_limit_bytes) {

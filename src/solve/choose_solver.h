@@ -8,14 +8,19 @@
 
 namespace sheaf {
 
+/// What the process holds once the problem is arranged, and what it held at most so far.
+struct MemoryHeld {
+  std::uint64_t resident_bytes = 0, peak_bytes = 0;
+};
+
 /// The solver asked for, or the one that the counts recommend; under a memory limit the leanest
-/// that fits. `resident_bytes`: what the process holds already. Errors: ErrorCode::memory_limit
-/// when none fits, ErrorCode::usage when the one asked for cannot solve the problem.
+/// that fits. Errors: ErrorCode::memory_limit when none fits, ErrorCode::usage when the one asked
+/// for cannot solve the problem.
 struct Choice {
   Plan plan;
   std::uint64_t forecast_bytes = 0;  ///< of the process
 };
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
-                             std::uint64_t resident_bytes);
+                             const MemoryHeld& held);
 
 }  // namespace sheaf

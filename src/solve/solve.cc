@@ -3,6 +3,7 @@
 #include "sheaf/solve.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -10,6 +11,8 @@
 #include "linear/kernel_table.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
+#include "residual/lent_observations.h"
+#include "scene/behind.h"
 #include "solve/choose_solver.h"
 #include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
@@ -65,6 +68,8 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (!(options.time_limit_s >= 0)) return usage("time_limit_s is negative or not a number");
   if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
   if (options.threads < 0) return usage("threads is negative");
+  if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz)
+    return usage("the dogleg steps points by X, Y, Z: it takes no other parametrisation of points");
   const Loss& loss = options.loss;
   if (!(loss.scale_px >= 0 && std::isfinite(loss.scale_px)))
     return usage("the scale of the loss is negative or not finite");
@@ -74,45 +79,85 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   return {};
 }
 
-/// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
-Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
-                    const Stopwatch& clock, Summary& summary) {
-  std::vector<std::uint8_t> skip;
-  if (options.cheirality == Cheirality::hold_out) {
-    summary.rejected_observations = evaluate(problem).behind;
-    skip.assign(problem.num_observations(), 0);
-    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
+ChartBase chart_base(PointParametrisation points) {
+  switch (points) {
+    case PointParametrisation::xyz:
+      return ChartBase::none;
+    case PointParametrisation::homogeneous:
+      return ChartBase::origin;
+    case PointParametrisation::inverse_depth:
+      return ChartBase::host;
   }
-  Threads threads(options.threads);
-  Columns columns = number_columns(problem, options.fixed);
-  const std::uint64_t resident = resident_bytes();
-  Batches batches = arrange(problem, skip);
-  WorkCounts counts = count_work(batches, columns, options.fixed.points);
-  counts.weighted = options.loss.kind != LossKind::none;
-  Result<Choice> choice = choose_solver(counts, options, threads.count(), resident);
-  if (!choice.ok()) return choice.error();
-  summary.solver = to_string(choice.value().plan.kind);
-  summary.solver_reason = choice.value().plan.reason;
-  summary.precision = choice.value().plan.mixed ? "mixed" : "double";
-  summary.forecast_bytes = choice.value().forecast_bytes;
+  return ChartBase::none;
+}
+
+/// A few hundred megabytes are worth a pass over the observations at the end.
+bool lends_observations(const Problem& problem, const Batches& batches, const SolveOptions& options,
+                        Threads& threads) {
+  constexpr std::size_t kWorthLending = 4000000;
+  return options.lend_observations && problem.num_observations() >= kWorthLending &&
+         LentObservations::possible(problem, batches, threads);
+}
+
+void tell(const Choice& choice, const SolveOptions& options, const Kernels& kernels,
+          const Threads& threads, Summary& summary) {
+  summary.solver = to_string(choice.plan.kind);
+  summary.solver_reason = choice.plan.reason;
+  summary.precision = choice.plan.mixed ? "mixed" : "double";
+  summary.forecast_bytes = choice.forecast_bytes;
   summary.simd = kernels.name;
   summary.loss = options.loss.kind;
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
+}
 
-  const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
-                         options.inner_iterations};
-  BundleSystem system(problem, std::move(batches), std::move(columns), rules, choice.value().plan,
-                      kernels, threads);
-  if (system.count_behind() > 0) summary.behind_camera_before = evaluate(problem).behind;
-  summary.setup_s = clock.seconds();
-  SolveOptions resolved = options;
-  if (resolved.initial_damping == 0)
-    resolved.initial_damping = default_damping(problem.num_images());
-  minimize_in_rounds(system, resolved, clock, summary);
-  system.store(problem);
+/// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
+Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+                    const Stopwatch& clock, Summary& summary) {
+  std::vector<std::uint8_t> skip;
+  Threads threads(options.threads);
+  if (options.cheirality == Cheirality::hold_out) {
+    summary.rejected_observations = behind_camera(problem, threads);
+    skip.assign(problem.num_observations(), 0);
+    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
+  }
+  Columns columns = number_columns(problem, options.fixed);
+  const Batches batches = arrange(problem, skip, threads);
+  Clusters clusters;
+  WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
+  counts.weighted = options.loss.kind != LossKind::none;
+  counts.dogleg = options.trust_region == TrustRegion::dogleg;
+  const bool lends = lends_observations(problem, batches, options, threads);
+  const std::uint64_t lent_bytes = lends ? LentObservations::bytes(problem) : 0;
+  Result<Choice> choice = choose_solver(counts, options, threads.count(),
+                                        {resident_bytes() - lent_bytes, peak_resident_bytes()});
+  if (!choice.ok()) return choice.error();
+  choice.value().plan.clusters = std::move(clusters);
+  tell(choice.value(), options, kernels, threads, summary);
+
+  bool behind_after = false;
+  {
+    std::optional<LentObservations> lent;
+    if (lends) {
+      summary.behind_camera_before = behind_camera(problem, threads);
+      lent.emplace(problem, batches, threads);
+    }
+    const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
+                           options.inner_iterations, chart_base(options.points)};
+    BundleSystem system(problem, batches, std::move(columns), rules, choice.value().plan, kernels,
+                        threads);
+    if (!lends && system.count_behind() > 0)
+      summary.behind_camera_before = behind_camera(problem, threads);
+    summary.setup_s = clock.seconds();
+    SolveOptions resolved = options;
+    if (resolved.initial_damping == 0)
+      resolved.initial_damping = default_damping(problem.num_images());
+    minimize_in_rounds(system, resolved, clock, summary);
+    system.store(problem);
+    behind_after = system.count_behind() > 0;
+  }
   summary.solve_s = clock.seconds() - summary.setup_s;
-  if (system.count_behind() > 0) summary.behind_camera_after = evaluate(problem).behind;
+  if (behind_after) summary.behind_camera_after = behind_camera(problem, threads);
   return {};
 }
 

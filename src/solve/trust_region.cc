@@ -9,10 +9,11 @@
 #include <optional>
 #include <string>
 
+#include "solve/step_control.h"
+
 namespace sheaf {
 namespace {
 
-constexpr double kLargestDamping = 1e32;
 /// Measured at 138 to 1723 images: 0.1 takes a step more, 0.01 twice the inner iterations.
 constexpr double kLoosestForcing = 0.03, kTightestForcing = 0.01;
 /// Below this relative decrease of the cost mixed precision goes on in double. Weak directions, of
@@ -21,35 +22,8 @@ constexpr double kLoosestForcing = 0.03, kTightestForcing = 0.01;
 constexpr double kPreciseBelow = 1e-5;
 /// A gain below this is a step that did not help.
 constexpr double kSmallestGain = 1e-3;
-/// Gain ratios this close to 1 come from a model that was exact.
-constexpr double kExact = 0.02, kCarefulDamping = 1e-4;
 /// A step that changes no block by more than this (relative) is rounding.
 constexpr double kRounding = 1e-14;
-
-/// lambda, and how fast it grows while steps are rejected (Nielsen's rule; Madsen, Nielsen,
-/// Tingleff 2004). A good step divides it by up to 10; the first one by 3, as one good step from
-/// afar says little about the model near the optimum; by 100 where the model was exact twice in a
-/// row, but then not below kCarefulDamping: there, ladybug-49 pays for haste with twice the steps.
-struct Damping {
-  double lambda;
-  double growth = 2;
-  bool first = true, was_exact = false;
-
-  void shrink(double gain) {
-    const bool exact = std::abs(gain - 1) < kExact;
-    double least = lambda * (first ? 1.0 / 3 : 0.1);
-    if (exact && was_exact) least = std::max(lambda * 0.01, std::min(least, kCarefulDamping));
-    lambda = std::max({least, lambda * (1 - std::pow(2 * gain - 1, 3)), 1e-16});
-    growth = 2;
-    was_exact = exact;
-    first = false;
-  }
-  void grow() {
-    was_exact = false;
-    lambda = std::min(lambda * growth, kLargestDamping);
-    growth *= 2;
-  }
-};
 
 class Loop {
  public:
@@ -60,18 +34,19 @@ class Loop {
         options_(options),
         since_start_(clock),
         summary_(summary),
-        settled_motion_px_(settled_motion_px) {
-    damping_.lambda = options.initial_damping > 0 ? options.initial_damping : default_damping(1);
-  }
+        settled_motion_px_(settled_motion_px),
+        control_(options.trust_region,
+                 options.initial_damping > 0 ? options.initial_damping : default_damping(1)) {}
 
   void run() {
     while (!done_) {
-      const Step step = system_.propose({damping_.lambda, forcing_, loss_, &cancelled_, precise_});
+      const Step step = system_.propose({control_.damping(), forcing_, loss_, &cancelled_, precise_,
+                                         control_.dogleg(), control_.radius()});
       if (!begun_) begin(step);
       if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
       if (!step.solved && out_of_time()) break;
       if (!step.solved) {
-        reject(record(step, std::nullopt));
+        reject(record(step, std::nullopt), std::nullopt);
         continue;
       }
       const Trial trial = system_.trial();
@@ -79,7 +54,7 @@ class Loop {
       if (accepts(trial, tried))
         accept(trial, tried);
       else
-        reject(tried);
+        reject(tried, trial);
     }
     summary_.final_cost = cost_;
     summary_.final_plain_cost = plain_cost_;
@@ -98,7 +73,8 @@ class Loop {
     summary_.initial_plain_cost = plain_cost_;
     Iteration start;
     start.cost = start.trial_cost = start.start_cost = cost_;
-    start.damping = damping_.lambda;
+    start.damping = control_.damping();
+    start.radius = control_.radius();
     start.gradient_max = step.gradient_max;
     if (!std::isfinite(cost_)) {
       end(Termination::no_usable_step,
@@ -115,9 +91,11 @@ class Loop {
     it.cost = it.start_cost = cost_;
     it.trial_cost = trial ? trial->cost : std::numeric_limits<double>::quiet_NaN();
     it.accepted = false;
-    it.damping = damping_.lambda;
+    it.damping = control_.damping();
     it.gradient_max = step.gradient_max;
     it.linear_iterations = step.linear_iterations;
+    it.radius = control_.radius();
+    it.reused = step.reused;
     if (trial) {
       it.gain_ratio = (cost_ - trial->cost) / trial->predicted_decrease;
       it.step_norm = trial->step_norm;
@@ -137,7 +115,7 @@ class Loop {
     cost_ = it.cost = trial.cost;
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
-    damping_.shrink(it.gain_ratio);
+    control_.accepted(it.gain_ratio, trial);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
     const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
@@ -148,15 +126,14 @@ class Loop {
           "converged: the cost fell by less than the tolerance, relatively, twice in a row");
   }
 
-  void reject(const Iteration& it) {
+  void reject(const Iteration& it, const std::optional<Trial>& trial) {
     const bool finite = std::isfinite(it.trial_cost);
     any_finite_trial_ = any_finite_trial_ || finite;
-    damping_.grow();
+    control_.rejected(trial);
     publish(it);
-    const bool exhausted = damping_.lambda >= kLargestDamping;
+    const bool exhausted = control_.exhausted();
     if (exhausted && !any_finite_trial_ && !moved())
-      return end(Termination::no_usable_step,
-                 "no step led to a finite cost, however strong the damping");
+      return end(Termination::no_usable_step, "no step led to a finite cost, however short");
     // Below the cost's own rounding a decrease cannot be seen.
     const double predicted = std::abs((cost_ - it.trial_cost) / it.gain_ratio);
     const bool invisible = finite && predicted < 4 * std::numeric_limits<double>::epsilon() * cost_;
@@ -165,7 +142,7 @@ class Loop {
           "converged: no step changes the cost by more than its rounding");
     else if (exhausted)
       end(Termination::step_converged,
-          "stopped: no step from here leads to a finite cost, however strong the damping");
+          "stopped: no step from here leads to a finite cost, however short");
   }
 
   bool gradient_vanished(const Step& step) {
@@ -220,7 +197,7 @@ class Loop {
   const Stopwatch since_begin_;
   Summary& summary_;
   const double settled_motion_px_;
-  Damping damping_;
+  StepControl control_;
   /// An iterative solver solves loosely at first and tighter as the cost settles.
   double forcing_ = kLoosestForcing;
   const std::function<bool()> cancelled_ = [this] { return must_stop(); };

@@ -19,8 +19,9 @@ namespace sheaf {
 /// some hundred images pay a step for it.
 double default_damping(std::size_t images);
 
-/// Levenberg-Marquardt with gain-ratio control on any System, with one loss. Adds to the summary's
-/// iterations, and sets costs, termination and words; the best state is the system's held one.
+/// Levenberg-Marquardt or a dogleg, with gain-ratio control, on any System, with one loss. Adds to
+/// the summary's iterations, and sets costs, termination and words; the best state is the system's
+/// held one.
 /// An infinite tolerance ends it after one accepted step; steps whose median motion is above
 /// settled_motion_px never end it.
 /// `since_start` runs since set-up began (the time limit counts from there).

@@ -92,6 +92,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUsage{{"solve", "tiny.txt", "--tolerance", "-1e-8"}, {"from 0 up"}},
         WrongUsage{{"solve", "tiny.txt", "--time-limit", "0"}, {"seconds above 0"}},
         WrongUsage{{"solve", "tiny.txt", "--initial-damping", "x"}, {"from 0 up"}},
+        WrongUsage{{"solve", "tiny.txt", "--trust-region", "cauchy"}, {"--trust-region", "dogleg"}},
         WrongUsage{{"solve", "tiny.txt", "--threads", "many"}, {"--threads", "many"}},
         WrongUsage{{"solve", "tiny.txt", "-o", "a", "--json", "./a"}, {"same file"}},
         WrongUsage{{"generate", "g.txt", "--cameras", "1"}, {"from 2 up"}},

@@ -42,8 +42,9 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--min-depth"});
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--loss", "--cheirality", "--fix", "--solver", "--memory-limit",
-                    "--initial-damping", "--inner-iterations", "--simd", "--precision"});
+                    "--loss", "--cheirality", "--points", "--fix", "--solver", "--memory-limit",
+                    "--trust-region", "--initial-damping", "--inner-iterations", "--simd",
+                    "--precision"});
   return options;
 }
 

@@ -169,6 +169,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                  "1e-12",
                  "--threads",
                  "2",
+                 "--points",
+                 "inverse-depth",
                  "--cheirality",
                  "reject",
                  "--solver",
@@ -177,6 +179,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                  "double",
                  "--initial-damping",
                  "0.01",
+                 "--trust-region",
+                 "dogleg",
                  "--time-limit",
                  "60"})
                 .exit_code,
@@ -187,10 +191,12 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"time_limit_s", 60.0},
                                 {"loss", "none"},
                                 {"cheirality", "reject"},
+                                {"points", "inverse-depth"},
                                 {"fix", {"k1", "pose=0"}},
                                 {"precision", "double"},
                                 {"solver", "dense"},
                                 {"memory_limit_bytes", 0},
+                                {"trust_region", "dogleg"},
                                 {"initial_damping", 0.01},
                                 {"inner_iterations", 3},
                                 {"simd", "best"}}));
@@ -213,6 +219,8 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
     }
   }
   EXPECT_EQ(iterations[1]["damping"], 0.01);
+  EXPECT_EQ(iterations[1]["radius"], nullptr);
+  EXPECT_EQ(iterations[1]["reused"], false);
   const double total = s["time"]["total_s"];
   EXPECT_GE(total, s["time"]["solve_s"].get<double>() + s["time"]["setup_s"].get<double>());
 }

@@ -29,7 +29,9 @@ Problem streets(std::uint32_t count, std::uint32_t images, std::uint32_t reach) 
 
 Clusters cluster(const Problem& p, const Fixed& fixed, std::size_t each) {
   const Batches batches = arrange(p);
-  return cluster_images(Covisibility(batches, p.num_images()), number_columns(p, fixed), each);
+  Threads threads(2);
+  return cluster_images(Covisibility(batches, p.num_images(), threads), number_columns(p, fixed),
+                        each);
 }
 
 TEST(Clusters, AreStretchesOfAStreet) {
@@ -89,7 +91,8 @@ TEST(Clusters, PairsThatSeeAPointInCommonAreNumberedOnce) {
                          column = c.of_image[p.observation_image[b]];
       if (row >= column) expected.insert({row, column});
     }
-  const std::vector<std::int32_t> numbers = number_cluster_pairs(batches, c);
+  Threads threads(2);
+  const std::vector<std::int32_t> numbers = number_cluster_pairs(batches, c, threads);
   EXPECT_EQ(count_cluster_pairs(numbers), expected.size());
   std::set<std::int32_t> seen;
   for (const auto& [row, column] : expected) seen.insert(numbers[cluster_pair(row, column)]);

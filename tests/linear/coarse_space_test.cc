@@ -30,7 +30,7 @@ struct Linearised {
   Columns columns;
   Buffer<double> cameras, points, tiles, diagonal;
   std::vector<double> damping;
-  Threads threads{1};
+  mutable Threads threads{1};
   std::unique_ptr<CoarseSpace> coarse;
   bool factored = false;
 
@@ -47,7 +47,7 @@ struct Linearised {
     chunks = cut_into_chunks(batches, kImages, ChunkLists::pairs);
     columns = number_columns(problem, fixed);
     fill_state();
-    const Covisibility graph(batches, kImages);
+    const Covisibility graph(batches, kImages, threads);
     Clusters clusters = cluster_images(graph, columns, each);
     coarse = std::make_unique<CoarseSpace>(batches, columns, std::move(clusters),
                                            chunks.slices.size() - 1, kernels, threads);
@@ -168,7 +168,8 @@ void expect_explicit_correction(const Fixed& fixed, std::uint32_t images_per_len
     const Linearised l(fixed, images_per_lens, 1e-3, 6, *kernels);
     ASSERT_TRUE(l.factored);
     ASSERT_GE(l.coarse->num_clusters(), 3);
-    const Clusters clusters = cluster_images(Covisibility(l.batches, kImages), l.columns, 6);
+    const Clusters clusters =
+        cluster_images(Covisibility(l.batches, kImages, l.threads), l.columns, 6);
     std::vector<double> r(l.columns.count), z(l.columns.count, 0.25);
     for (std::size_t i = 0; i < r.size(); ++i) r[i] = std::sin(1.0 + 3 * double(i));
     const std::vector<double> expected = corrected(l.system(), l.basis(clusters), r);
@@ -215,7 +216,7 @@ TEST(CoarseSpace, SimilaritiesOfTheWholeSceneCostNothing) {
 
 TEST(CoarseSpace, SmallProblemsHaveNone) {
   const Linearised l({}, 1, 1e-3, 6, reference_kernels());
-  EXPECT_EQ(coarse_clusters(l.batches, l.columns).count, 0);
+  EXPECT_EQ(coarse_clusters(l.batches, l.columns, l.threads).count, 0);
 }
 
 }  // namespace

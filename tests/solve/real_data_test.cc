@@ -69,6 +69,45 @@ TEST(RealData, FewStepsLeadNearTheOptimum) {
   }
 }
 
+TEST(RealData, ADoglegReachesTheKnownOptimumWithEverySolver) {
+  struct Optimum {
+    const char* name;
+    double cost;
+  };
+  for (const Optimum& known : {Optimum{"dubrovnik-16-22106-pre.txt", 18033.90348 * (1 + 1e-9)},
+                               Optimum{"trafalgar-21-11315-pre.txt", 30378.6358 * (1 + 1e-9)},
+                               Optimum{"ladybug-49-7776-pre.txt", 13352}}) {
+    const std::string path = real_data(known.name);
+    if (path.empty()) GTEST_SKIP() << known.name << " is not in $SHEAF_DATA/bal";
+    const Problem start = read(path).value();
+    SolveOptions options;
+    options.trust_region = TrustRegion::dogleg;
+    for (CameraSolverKind solver :
+         {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+          CameraSolverKind::iterative_implicit}) {
+      options.solver = solver;
+      Problem problem = start;
+      const Summary s = solve(problem, options);
+      EXPECT_LT(s.final_cost, known.cost) << known.name << " " << s.solver;
+    }
+  }
+}
+
+// From hardly any damping the first steps of ladybug-49 are rejected. A shorter step on the
+// dogleg's path finds its way where more damping ends in a worse valley, at 14109.
+TEST(RealData, ADoglegRecoversFromTooLittleDamping) {
+  const std::string path = real_data("ladybug-49-7776-pre.txt");
+  if (path.empty()) GTEST_SKIP() << "ladybug-49 is not in $SHEAF_DATA/bal";
+  Problem problem = read(path).value();
+  SolveOptions options;
+  options.trust_region = TrustRegion::dogleg;
+  options.initial_damping = 1e-6;
+  const Summary s = solve(problem, options);
+  EXPECT_LT(s.final_cost, 13352);
+  EXPECT_TRUE(std::any_of(s.iterations.begin(), s.iterations.end(),
+                          [](const Iteration& it) { return it.accepted && it.reused; }));
+}
+
 TEST(RealData, RejectNeverPutsMoreBehind) {
   const std::string path = real_data("ladybug-49-7776-pre.txt");
   if (path.empty()) GTEST_SKIP() << "ladybug-49 is not in $SHEAF_DATA/bal";

@@ -349,6 +349,11 @@ TEST(Solve, RefusesWhatMakesNoSense) {
            {with([&](auto& o) { o.gradient_tolerance = nan; }), "gradient_tolerance"},
            {with([&](auto& o) { o.time_limit_s = nan; }), "time_limit"},
            {with([](auto& o) { o.initial_damping = -1; }), "initial_damping"},
+           {with([](auto& o) {
+              o.trust_region = TrustRegion::dogleg;
+              o.points = PointParametrisation::homogeneous;
+            }),
+            "dogleg"},
            {with([](auto& o) { o.inner_iterations = -1; }), "inner_iterations"},
            {with([](auto& o) { o.threads = -1; }), "threads"},
            {with([](auto& o) { o.fixed.pose_ids = {99}; }), "pose 99"},

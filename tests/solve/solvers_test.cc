@@ -66,6 +66,38 @@ TEST_P(Solvers, AgreeOnAScene) {
   expect_same_optimum(on_true_points, points_held());
 }
 
+TEST_P(Solvers, AgreeWithADogleg) {
+  const Scene scene = small_scene();
+  const auto expect_same = [](const Problem& start, SolveOptions options) {
+    options.tolerance = 1e-13;
+    options.max_iterations = 200;
+    Problem reference = start;
+    const double expected = solve(reference, options).final_cost;
+    options.solver = GetParam().solver;
+    options.precision = GetParam().precision;
+    options.trust_region = TrustRegion::dogleg;
+    for (double damping : {0.0, 1e-9}) {
+      options.initial_damping = damping;
+      Problem problem = start;
+      const Summary s = solve(problem, options);
+      EXPECT_TRUE(s.usable()) << s.words;
+      EXPECT_NEAR(s.final_cost, expected, 1e-8 * expected);
+    }
+  };
+  SolveOptions options;
+  expect_same(scene.start, options);
+  options.loss = Huber{1};
+  expect_same(scene.start, options);
+  options.fixed.pose_ids = {3};
+  options.fixed.k1 = true;
+  expect_same(scene.start, options);
+  Problem on_true_points = scene.start;
+  on_true_points.points = scene.truth.points;
+  options.fixed = points_held();
+  expect_same(on_true_points, options);
+  expect_same(shared_lens_scene(2, false).start, {});
+}
+
 TEST_P(Solvers, AgreeWithALoss) {
   const Scene scene = small_scene();
   expect_same_optimum(scene.start, {}, Huber{1});
@@ -255,6 +287,10 @@ TEST(OverlongTrack, IsSolvedOrRefusedNeverMiscounted) {
                     c.solver == CameraSolverKind::iterative_explicit)
             << s.error().what();
         continue;
+      }
+      if (c.solver == CameraSolverKind::automatic && !held) {
+        EXPECT_EQ(s.value().solver, "iterative-implicit");
+        EXPECT_NE(s.value().solver_reason.find("too often"), std::string::npos);
       }
       EXPECT_LT(scaled_gradient(problem, options.fixed, 5),
                 1e-3 * scaled_gradient(start, options.fixed, 5));

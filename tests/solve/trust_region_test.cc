@@ -29,6 +29,8 @@ class Valley : public System {
   Step propose(const StepRequest& request) override {
     const double damping = request.damping;
     dampings.push_back(damping);
+    radii.push_back(request.radius);
+    EXPECT_EQ(request.dogleg, dogleg);
     proposed_from.push_back(held_);
     const auto [x, y] = held_;
     const double r0 = 10 * (y - x * x), r1 = 1 - x;
@@ -53,9 +55,18 @@ class Valley : public System {
     ready_ = Ready::to_accept;
     ++trials;
     Trial out;
+    const double length = std::hypot(step_[0], step_[1]);
+    const double share = std::min(1.0, radii.back() / length);
+    double slope = 0, curvature = 0;
+    for (int i = 0; i < 2; ++i) {
+      slope -= step_[i] * gradient_[i];
+      curvature -= step_[i] * (gradient_[i] + damped_[i] * step_[i]);
+      step_[i] *= share;
+    }
     out.cost = cost({held_[0] + step_[0], held_[1] + step_[1]});
-    for (int i = 0; i < 2; ++i)
-      out.predicted_decrease += step_[i] * (damped_[i] * step_[i] - gradient_[i]) / 2;
+    out.predicted_decrease = share * slope - share * share * curvature / 2;
+    out.length = share * length;
+    out.damping = dampings.back() / share;
     out.step_norm = std::hypot(step_[0], step_[1]) / std::hypot(held_[0], held_[1]);
     if (on_trial) on_trial(trials, out);
     return out;
@@ -78,7 +89,8 @@ class Valley : public System {
   bool fails_to_solve = false;
   double smallest_gradient = 0;
   std::function<void(int trial, Trial& answer)> on_trial;
-  std::vector<double> dampings;
+  bool dogleg = false;  ///< what the loop is expected to ask for
+  std::vector<double> dampings, radii;
   std::vector<State> proposed_from;
   int trials = 0;
 
@@ -353,6 +365,63 @@ TEST(TrustRegion, RunsOutOfDampingOnlyAfterAMoveAsConverged) {
   EXPECT_TRUE(summary.usable());
   EXPECT_LT(summary.final_cost, summary.initial_cost);
   EXPECT_EQ(summary.final_cost, valley.cost(valley.held()));
+}
+
+SolveOptions with_dogleg() {
+  SolveOptions options;
+  options.trust_region = TrustRegion::dogleg;
+  return options;
+}
+
+TEST(TrustRegion, ARejectedDoglegAsksForAShorterStepAndNothingElse) {
+  Valley valley(kStart);
+  valley.dogleg = true;
+  std::vector<double> lengths;
+  valley.on_trial = [&](int, Trial& answer) { lengths.push_back(answer.length); };
+  const Summary summary = minimized(valley, with_dogleg());
+  EXPECT_EQ(summary.termination, Termination::gradient_converged);
+  EXPECT_LT(summary.final_cost, 1e-25);
+  ASSERT_FALSE(summary.iterations[1].accepted);
+  EXPECT_EQ(valley.radii[0], kInfinity);
+  EXPECT_EQ(valley.radii[1], lengths[0] / 2);
+  EXPECT_EQ(valley.dampings[1], valley.dampings[0]);
+  for (std::size_t i = 1; i < summary.iterations.size(); ++i) {
+    EXPECT_EQ(summary.iterations[i].radius, valley.radii[i - 1]);
+    EXPECT_LE(lengths[i - 1], valley.radii[i - 1] * (1 + 1e-12));
+  }
+  EXPECT_EQ(summary.iterations.back().radius, kInfinity);  // near the end nothing is cut
+}
+
+TEST(TrustRegion, ADoglegWithoutASystemAsksForMoreDamping) {
+  Valley valley(kNear);
+  valley.dogleg = valley.fails_to_solve = true;
+  SolveOptions options = with_dogleg();
+  options.on_iteration = [&](const Iteration& it) {
+    if (it.index == 2) valley.fails_to_solve = false;
+    return true;
+  };
+  EXPECT_EQ(minimized(valley, options).termination, Termination::gradient_converged);
+  EXPECT_GT(valley.dampings[1], valley.dampings[0]);
+  EXPECT_GT(valley.dampings[2], valley.dampings[1]);
+  EXPECT_EQ(valley.radii[2], kInfinity);
+}
+
+TEST(TrustRegion, ADoglegGivesUpWhenTheRadiusIsNothing) {
+  Valley valley(kNear);
+  valley.dogleg = true;
+  valley.on_trial = [](int, Trial& answer) { answer.cost = kInfinity; };
+  const Summary summary = minimized(valley, with_dogleg());
+  EXPECT_EQ(summary.termination, Termination::no_usable_step);
+  EXPECT_LT(valley.radii.back(), 1e-20);
+  EXPECT_LE(summary.iterations.size(), 20u);
+}
+
+TEST(TrustRegion, LevenbergMarquardtKnowsNoRadius) {
+  Valley valley(kStart);
+  for (const Iteration& it : minimized(valley).iterations) {
+    EXPECT_EQ(it.radius, kInfinity);
+    EXPECT_FALSE(it.reused);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,84 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "linear/system.h"
+#include "sheaf/options.h"
+
+namespace sheaf {
+
+constexpr double kLargestDamping = 1e32;
+/// Gain ratios this close to 1 come from a model that was exact.
+constexpr double kExact = 0.02, kCarefulDamping = 1e-4;
+
+/// lambda, and how fast it grows while steps are rejected (Nielsen's rule; Madsen, Nielsen,
+/// Tingleff 2004). A good step divides it by up to 10; the first one by 3, as one good step from
+/// afar says little about the model near the optimum; by 100 where the model was exact twice in a
+/// row, but then not below kCarefulDamping: there, ladybug-49 pays for haste with twice the steps.
+struct Damping {
+  double lambda;
+  double growth = 2;
+  bool first = true, was_exact = false;
+
+  void shrink(double gain) {
+    const bool exact = std::abs(gain - 1) < kExact;
+    double least = lambda * (first ? 1.0 / 3 : 0.1);
+    if (exact && was_exact) least = std::max(lambda * 0.01, std::min(least, kCarefulDamping));
+    lambda = std::max({least, lambda * (1 - std::pow(2 * gain - 1, 3)), 1e-16});
+    growth = 2;
+    was_exact = exact;
+    first = false;
+  }
+  void grow() {
+    was_exact = false;
+    lambda = std::min(lambda * growth, kLargestDamping);
+    growth *= 2;
+  }
+};
+
+/// What bounds the next step: Levenberg-Marquardt's damping and, for a dogleg, a radius. The
+/// dogleg's Newton point is damped by the same rule, from the damping that the step taken amounts
+/// to. The radius comes with the first rejected step, at half its length, and stays for as long as
+/// it cuts steps.
+class StepControl {
+ public:
+  StepControl(TrustRegion kind, double damping)
+      : dogleg_(kind == TrustRegion::dogleg), damping_{damping} {}
+
+  bool dogleg() const { return dogleg_; }
+  double damping() const { return damping_.lambda; }
+  double radius() const { return radius_; }
+
+  void accepted(double gain, const Trial& trial) {
+    if (dogleg_) {
+      const bool cut = trial.length >= radius_ * (1 - 1e-9);
+      if (cut) damping_.lambda = std::max(damping_.lambda, trial.damping);
+      radius_ = cut ? trial.length * (gain > 0.75 ? 3 : gain > 0.25 ? 1.5 : 0.5) : kUnbounded;
+      shorten_ = 2;
+    }
+    damping_.shrink(gain);
+  }
+  /// Without a trial there was no step: the system was not positive definite.
+  void rejected(const std::optional<Trial>& trial) {
+    if (!dogleg_ || !trial || !std::isfinite(trial->length)) return damping_.grow();
+    radius_ = std::min(radius_, trial->length) / shorten_;
+    shorten_ *= 2;
+  }
+  bool exhausted() const { return damping_.lambda >= kLargestDamping || radius_ <= kLeastRadius; }
+
+ private:
+  static constexpr double kLeastRadius = 1e-32;
+  static constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+  const bool dogleg_;
+  Damping damping_;
+  double radius_ = kUnbounded;
+  double shorten_ = 2;
+};
+
+}  // namespace sheaf

@@ -1,0 +1,107 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solve/textbook.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/bal_camera.h"
+#include "geometry/rigid_motion.h"
+
+namespace sheaf {
+
+Places::Places(const Problem& p, const Fixed& fixed) {
+  const auto free = [](const std::vector<std::uint32_t>& ids, std::size_t i) {
+    return std::find(ids.begin(), ids.end(), i) == ids.end();
+  };
+  for (std::size_t i = 0; i < p.num_images(); ++i)
+    for (int k = 0; k < 6; ++k)
+      pose.push_back(!fixed.poses && free(fixed.pose_ids, i) ? count++ : -1);
+  const bool held[3] = {fixed.f, fixed.k1, fixed.k2};
+  for (std::size_t i = 0; i < p.cameras.size(); ++i)
+    for (bool h : held) lens.push_back(!h && free(fixed.camera_ids, i) ? count++ : -1);
+  for (std::size_t i = 0; i < p.points.size(); ++i) point.push_back(fixed.points ? -1 : count++);
+}
+
+Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss)
+    : A(static_cast<std::size_t>(at.count) * at.count), b(at.count) {
+  for (std::size_t i = 0; i < p.num_observations(); ++i) {
+    const std::size_t image = p.observation_image[i], point = p.observation_point[i];
+    const std::size_t lens = p.image_camera[image];
+    const auto& k = p.cameras[lens].parameters;
+    const auto j = project_with_jacobian<double>(
+        matrix_from_quaternion(p.poses[image].rotation), p.poses[image].translation,
+        {k[0], k[1], k[2]},
+        {p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
+    const double r[2] = {j.pixel[0] - p.observation_xy[2 * i],
+                         j.pixel[1] - p.observation_xy[2 * i + 1]};
+    const LossValue<double> rho = evaluate_loss(loss, r[0] * r[0] + r[1] * r[1]);
+    cost += rho.value / 2;
+    const double w = std::sqrt(rho.first);
+    for (int row = 0; row < 2; ++row) {
+      std::vector<std::pair<int, double>> entries;
+      for (int c = 0; c < 6; ++c)
+        entries.emplace_back(at.pose[6 * image + c], w * j.camera[9 * row + c]);
+      for (int c = 0; c < 3; ++c)
+        entries.emplace_back(at.lens[3 * lens + c], w * j.camera[9 * row + 6 + c]);
+      for (int c = 0; c < 3; ++c)
+        entries.emplace_back(at.point[3 * point + c], w * j.point[3 * row + c]);
+      add_row(entries, w * r[row]);
+    }
+  }
+}
+
+void Normal::add_row(const std::vector<std::pair<int, double>>& entries, double r) {
+  for (const auto& [a, va] : entries) {
+    if (a < 0) continue;
+    b[a] -= va * r;
+    for (const auto& [c, vc] : entries)
+      if (c >= 0) A[a * b.size() + c] += va * vc;
+  }
+}
+
+std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b) {
+  const std::size_t n = b.size();
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t r = k + 1; r < n; ++r) {
+      const double f = A[r * n + k] / A[k * n + k];
+      if (f == 0) continue;
+      for (std::size_t c = k; c < n; ++c) A[r * n + c] -= f * A[k * n + c];
+      b[r] -= f * b[k];
+    }
+  for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t c = k + 1; c < n; ++c) b[k] -= A[k * n + c] * b[c];
+    b[k] /= A[k * n + k];
+  }
+  return b;
+}
+
+void move(Problem& p, const Places& at, const std::vector<double>& x) {
+  const auto step = [&](int place) { return place < 0 ? 0 : x[place]; };
+  for (std::size_t i = 0; i < p.num_images(); ++i) {
+    Vector3<double> rho, phi;
+    for (int k = 0; k < 3; ++k) rho[k] = step(at.pose[6 * i + k]);
+    for (int k = 0; k < 3; ++k) phi[k] = step(at.pose[6 * i + 3 + k]);
+    const auto moved =
+        left_perturbed(RigidMotion<double>{p.poses[i].rotation, p.poses[i].translation}, rho, phi);
+    p.poses[i] = {moved.rotation, moved.translation};
+  }
+  for (std::size_t i = 0; i < at.lens.size(); ++i)
+    p.cameras[i / 3].parameters[i % 3] += step(at.lens[i]);
+  for (std::size_t i = 0; i < at.point.size(); ++i) p.points[i] += step(at.point[i]);
+}
+
+Problem first_points(const Problem& p, std::uint32_t points) {
+  Problem out = p;
+  out.points.resize(3 * points);
+  out.observation_image.clear();
+  out.observation_point.clear();
+  out.observation_xy.clear();
+  for (std::size_t i = 0; i < p.num_observations(); ++i)
+    if (p.observation_point[i] < points)
+      out.add_observation(p.observation_image[i], p.observation_point[i], p.observation_xy[2 * i],
+                          p.observation_xy[2 * i + 1]);
+  return out;
+}
+
+}  // namespace sheaf

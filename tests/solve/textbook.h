@@ -1,0 +1,44 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "geometry/loss.h"
+#include "sheaf/problem.h"
+
+// A step by the textbook: the whole Jacobian's normal equations as a dense matrix, cameras and
+// points together, no elimination.
+namespace sheaf {
+
+/// Where the parameters of a problem stand in the textbook's vector; -1: held.
+struct Places {
+  std::vector<int> pose, lens, point;
+  int count = 0;
+
+  Places(const Problem& p, const Fixed& fixed);
+};
+
+/// A = J^T J, row-major, and b = -J^T r.
+struct Normal {
+  std::vector<double> A, b;
+  double cost = 0;
+
+  Normal(const Problem& p, const Places& at, const ScaledLoss& loss);
+
+ private:
+  void add_row(const std::vector<std::pair<int, double>>& entries, double r);
+};
+
+/// Solves A x = b for a symmetric positive definite A, by elimination without pivoting.
+std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b);
+
+/// Steps every free parameter by x.
+void move(Problem& p, const Places& at, const std::vector<double>& x);
+
+/// Only what the first `points` points contribute: small enough for the textbook.
+Problem first_points(const Problem& p, std::uint32_t points);
+
+}  // namespace sheaf
