@@ -21,6 +21,7 @@
 #include "program.h"
 #include "report/comparison.h"
 #include "sheaf/sheaf.h"
+#include "solve_arguments.h"
 #include "solver_programs.h"
 #include "solver_run.h"
 #include "summary_text.h"
@@ -36,6 +37,7 @@ struct Arguments {
   std::string in, reference, solvers, peers, plot;
   std::vector<double> taus = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
   int runs = 1;
+  bool steps = false;
 };
 
 void tell(const Arguments& arguments, const SolverRun& run) {
@@ -86,7 +88,8 @@ Json document_of(const Arguments& arguments, const Json& input, const SolverList
           {"problem", input},
           {"options",
            {{"threads", record.threads},
-            {"tolerance", kCompareTolerance},
+            {"tolerance", limits.tolerance},
+            {"fix", limits.fix.empty() ? Json() : Json(limits.fix)},
             {"max_iterations", limits.max_iterations},
             {"time_limit_s", limits.time_s},
             {"runs", arguments.runs},
@@ -103,9 +106,11 @@ void print(const Arguments& arguments, const Problem& problem, const SolverList&
   fmt::print(
       "{} thread{}; each solver ends after two accepted steps that decrease the cost by less than "
       "{:g} of it, {} steps or {:g} s\n",
-      record.threads, record.threads == 1 ? "" : "s", kCompareTolerance,
+      record.threads, record.threads == 1 ? "" : "s", arguments.limits.tolerance,
       arguments.limits.max_iterations, arguments.limits.time_s);
+  if (!arguments.limits.fix.empty()) fmt::print("held: {}\n", arguments.limits.fix);
   fmt::print("best cost {:.10g}\n\n{}", record.best, comparison_text(record));
+  if (arguments.steps) fmt::print("\n{}\n", steps_table(record));
   for (const MissingSolver& solver : solvers.missing)
     fmt::print("not here: {}: {}\n", solver.name, solver.how);
 }
@@ -119,9 +124,11 @@ int run(const Arguments& arguments) {
   Problem reference;
   if (!arguments.reference.empty()) reference = read(arguments.reference).value();
   const char* folders = std::getenv("SHEAF_PEERS");
+  Fixed fixed;
+  if (!arguments.limits.fix.empty()) parse_fix(arguments.limits.fix, fixed);
   const SolverList solvers = find_solvers(
       arguments.solvers, !arguments.peers.empty() || folders == nullptr ? arguments.peers : folders,
-      input.problem);
+      input.problem, fixed);
   if (!arguments.reference.empty()) list_errors(input.problem, reference, AlignBy::nothing).value();
 
   const int threads = arguments.common.threads > 0
@@ -171,6 +178,21 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("SECONDS")
       ->check(number_in(0, 1e6, false, "a number of seconds above 0"))
       ->capture_default_str();
+  verb.add_option("--tolerance", a.limits.tolerance,
+                  "each solver ends after two accepted steps in a row that decrease the cost by "
+                  "less than this part of it")
+      ->type_name("T")
+      ->check(number_in(0, std::numeric_limits<double>::max(), true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--fix", a.limits.fix,
+                  "what every solver holds, as in solve; one that cannot is a row that says so")
+      ->type_name("LIST")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Fixed ignored;
+            return parse_fix(text, ignored);
+          },
+          ""));
   verb.add_option("--time-to", a.taus, "times until the cost is within these parts of the best")
       ->type_name("TAUS")
       ->delimiter(',')
@@ -180,6 +202,7 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("N")
       ->check(whole_number_from(1, "a whole number from 1 up"))
       ->capture_default_str();
+  verb.add_flag("--steps", a.steps, "also a table of each step: seconds, chi2, which were rejected");
   verb.add_option("--plot", a.plot, "cost against time, as SVG")->type_name("FILE");
 }
 
@@ -198,7 +221,9 @@ void add_compare(CLI::App& app, int& exit_code) {
       "Example:\n  sheaf compare problem.txt --solvers sheaf,sheaf:sparse --threads 1 --plot "
       "compare.svg\n"
       "\nWith every peer that is installed, and errors against a known truth:\n"
-      "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json");
+      "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json\n"
+      "\nPoses and lenses alone, step by step:\n"
+      "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
