@@ -202,7 +202,8 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("N")
       ->check(whole_number_from(1, "a whole number from 1 up"))
       ->capture_default_str();
-  verb.add_flag("--steps", a.steps, "also a table of each step: seconds, chi2, which were rejected");
+  verb.add_flag("--steps", a.steps,
+                "also a table of each step: seconds, chi2, which were rejected");
   verb.add_option("--plot", a.plot, "cost against time, as SVG")->type_name("FILE");
 }
 

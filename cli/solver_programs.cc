@@ -52,7 +52,7 @@ std::string usual_config(const std::string& name, const Problem& problem, const 
   const std::size_t images = problem.num_images();
   if (name.rfind("ceres", 0) == 0)
     return fixed.points     ? "sparse_normal-analytic"
-           : images <= 150    ? "dense_schur-analytic"
+           : images <= 150  ? "dense_schur-analytic"
            : images <= 2000 ? "sparse_schur-analytic"
                             : "iterative_implicit-analytic";
   if (name.rfind("g2o", 0) == 0) return "eigen-lambda=1e-2";
@@ -79,7 +79,8 @@ std::string how_to_install(const std::string& name) {
 void add_solver(const std::string& name, const std::string& config, const Programs& programs,
                 const Problem& problem, const Fixed& fixed, SolverList& out) {
   const auto add = [&](const std::string& full, const fs::path& program) {
-    out.found.push_back({full, config.empty() ? usual_config(full, problem, fixed) : config, program});
+    out.found.push_back(
+        {full, config.empty() ? usual_config(full, problem, fixed) : config, program});
   };
   if (name == "sheaf") return add(name, own_program());
   if (const auto exact = programs.find(name); exact != programs.end())
@@ -105,7 +106,8 @@ SolverList find_solvers(const std::string& list, const std::string& folders, con
   SolverList out;
   if (list.empty()) {
     add_solver("sheaf", "", programs, problem, fixed, out);
-    for (const auto& [name, program] : programs) add_solver(name, "", programs, problem, fixed, out);
+    for (const auto& [name, program] : programs)
+      add_solver(name, "", programs, problem, fixed, out);
     for (const std::string name : {"ceres", "g2o", "gtsam", "colmap"}) {
       const auto has = [&](const SolverProgram& s) { return s.name.rfind(name, 0) == 0; };
       if (std::none_of(out.found.begin(), out.found.end(), has))
@@ -118,8 +120,8 @@ SolverList find_solvers(const std::string& list, const std::string& folders, con
     const std::string name = item.substr(0, colon);
     if (name.empty())
       throw Error(ErrorCode::usage, "--solvers: expected NAME[:CONFIG],..., not '" + list + "'");
-    add_solver(name, colon < item.size() ? item.substr(colon + 1) : "", programs, problem,
-               fixed, out);
+    add_solver(name, colon < item.size() ? item.substr(colon + 1) : "", programs, problem, fixed,
+               out);
   }
   return out;
 }

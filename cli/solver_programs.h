@@ -32,8 +32,8 @@ struct SolverList {
 /// peers that are found. A NAME without a program of that name stands for all whose names begin so
 /// ("ceres": "ceres-2.1"). Peers (programs peer-NAME) are looked for in `folders`
 /// (colon-separated), then in ../libexec/sheaf and bench/peers beside this command. Throws Error
-/// (ErrorCode::usage) for an entry without a name. `fixed`: what is held, for the configuration that a
-/// peer takes where none is stated.
+/// (ErrorCode::usage) for an entry without a name. `fixed`: what is held, for the configuration
+/// that a peer takes where none is stated.
 SolverList find_solvers(const std::string& list, const std::string& folders, const Problem& problem,
                         const Fixed& fixed);
 

@@ -41,18 +41,13 @@ std::vector<std::string> sheaf_words(const SolverProgram& solver, const RunSetti
 }
 
 std::vector<std::string> peer_words(const SolverProgram& solver, const RunSetting& setting) {
-  std::vector<std::string> words = {solver.program,
-                                    setting.path,
-                                    "--config",
-                                    solver.config,
-                                    "--threads",
-                                    std::to_string(setting.threads),
-                                    "--max-iterations",
-                                    std::to_string(setting.limits.max_iterations),
-                                    "--time-limit",
-                                    fmt::format("{}", setting.limits.time_s),
-                                    "--tolerance",
-                                    fmt::format("{}", setting.limits.tolerance)};
+  std::vector<std::string> words = {
+      solver.program,     setting.path,
+      "--config",         solver.config,
+      "--threads",        std::to_string(setting.threads),
+      "--max-iterations", std::to_string(setting.limits.max_iterations),
+      "--time-limit",     fmt::format("{}", setting.limits.time_s),
+      "--tolerance",      fmt::format("{}", setting.limits.tolerance)};
   if (!setting.limits.fix.empty()) words.insert(words.end(), {"--fix", setting.limits.fix});
   words.insert(words.end(), {"--out", setting.scratch / "final.txt"});
   return words;

@@ -191,7 +191,10 @@ struct Words {
 
 std::vector<int> held_parameters(const std::set<std::string>& fix, bool hold_k2) {
   const std::vector<std::pair<std::string, std::vector<int>>> meanings = {
-      {"poses", {0, 1, 2, 3, 4, 5}}, {"intrinsics", {6, 7, 8}}, {"f", {6}}, {"k1", {7}},
+      {"poses", {0, 1, 2, 3, 4, 5}},
+      {"intrinsics", {6, 7, 8}},
+      {"f", {6}},
+      {"k1", {7}},
       {"k2", {8}}};
   std::set<int> out;
   for (const auto& [word, parameters] : meanings)

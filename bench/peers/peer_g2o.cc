@@ -149,8 +149,7 @@ class Tries {
   /// Seconds of all tries but the last, which is what the iteration ends with.
   std::vector<double> take_refused() {
     std::vector<double> out;
-    for (std::size_t k = 1; k < begun_s_.size(); ++k)
-      out.push_back(begun_s_[k] - begun_s_[k - 1]);
+    for (std::size_t k = 1; k < begun_s_.size(); ++k) out.push_back(begun_s_[k] - begun_s_[k - 1]);
     begun_s_.clear();
     return out;
   }

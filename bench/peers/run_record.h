@@ -18,9 +18,9 @@ struct Arguments {
   int threads = 1;
   int max_iterations = 50;
   double time_limit_s = std::numeric_limits<double>::infinity();
-  double cost_target = -1;  ///< stop once the cost is at or below it
+  double cost_target = -1;   ///< stop once the cost is at or below it
   double tolerance = 1e-12;  ///< and after two accepted steps with no more decrease than this part
-  bool test = false;        ///< check the derivatives instead of solving
+  bool test = false;         ///< check the derivatives instead of solving
 };
 
 /// IN --config NAME --fix LIST --threads N --max-iterations K --time-limit S --tolerance T
@@ -58,7 +58,7 @@ class RunRecord {
   /// A peer's step with the tries that it refused inside: seconds of each. They are steps of their
   /// own in the trace, and the accepted one has what is left of the time.
   void add_with_tries(double cost, const std::vector<double>& refused_s);
-  void finish();                                           ///< the solver returned
+  void finish();                                ///< the solver returned
   void counts_in_float() { in_float_ = true; }  ///< costs and states are rounded to float
 
   /// Target reached, time spent, or two accepted steps in a row whose relative decrease is at most

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "linear/bundle_system.h"
+#include "linear/image_system.h"
 #include "linear/kernel_table.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
@@ -111,6 +112,29 @@ void tell(const Choice& choice, const SolveOptions& options, const Kernels& kern
   if (options.on_plan) options.on_plan(summary);
 }
 
+/// Points held, no lens shared: images by themselves.
+Result<void> refine_images(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+                           const std::vector<std::uint8_t>& skip, Columns columns, Threads& threads,
+                           const Stopwatch& clock, Summary& summary) {
+  const Result<Choice> choice = choose_for_images(columns, count_image_batches(problem), options,
+                                                  {resident_bytes(), peak_resident_bytes()});
+  if (!choice.ok()) return choice.error();
+  tell(choice.value(), options, kernels, threads, summary);
+  ImageSystem system(problem, arrange_by_image(problem, skip), std::move(columns),
+                     options.cheirality != Cheirality::formula, image_kernels(kernels.name),
+                     threads);
+  if (system.count_behind() > 0) summary.behind_camera_before = behind_camera(problem, threads);
+  summary.setup_s = clock.seconds();
+  SolveOptions resolved = options;
+  if (resolved.initial_damping == 0)
+    resolved.initial_damping = default_damping(problem.num_images());
+  minimize_in_rounds(system, resolved, clock, summary);
+  system.store(problem);
+  summary.solve_s = clock.seconds() - summary.setup_s;
+  if (system.count_behind() > 0) summary.behind_camera_after = behind_camera(problem, threads);
+  return {};
+}
+
 /// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
 Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
                     const Stopwatch& clock, Summary& summary) {
@@ -122,6 +146,9 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
     for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
   }
   Columns columns = number_columns(problem, options.fixed);
+  if (options.fixed.points && !columns.lens_shared && options.solver == CameraSolverKind::automatic)
+    return refine_images(problem, options, kernels, skip, std::move(columns), threads, clock,
+                         summary);
   const Batches batches = arrange(problem, skip, threads);
   Clusters clusters;
   WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
