@@ -146,7 +146,10 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
     for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
   }
   Columns columns = number_columns(problem, options.fixed);
-  if (options.fixed.points && !columns.lens_shared && options.solver == CameraSolverKind::automatic)
+  const bool only_images = options.fixed.points && !columns.lens_shared &&
+                           options.trust_region == TrustRegion::lm &&
+                           options.solver == CameraSolverKind::automatic;
+  if (only_images)
     return refine_images(problem, options, kernels, skip, std::move(columns), threads, clock,
                          summary);
   const Batches batches = arrange(problem, skip, threads);
