@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sheaf/camera.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 #include "sheaf/loss.h"

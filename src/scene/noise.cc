@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "geometry/camera_model.h"
 #include "platform/random.h"
 #include "scene/view.h"
 #include "sheaf/scene.h"
@@ -98,14 +100,21 @@ void disturb_images(Problem& problem, const NoiseOptions& o) {
   }
 }
 
+// f (fx and fy alike), k1 and k2; what a model does not have draws its number all the same.
 void disturb_lenses(Problem& problem, const NoiseOptions& o) {
   Random random(o.seed, kLenses);
   for (Camera& camera : problem.cameras) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double draw = random.normal();
-      double& parameter = camera.parameters[k];
+    const ParameterRoles roles = roles_of(camera.model);
+    const auto disturb = [&](int which, std::size_t k, double draw) {
+      if (which < 0) return;
+      double& parameter = camera.parameters[static_cast<std::size_t>(which)];
       parameter += (o.intrinsics[k] + o.intrinsics_relative[k] * std::fabs(parameter)) * draw;
-    }
+    };
+    const double f = random.normal();
+    disturb(roles.fx, 0, f);
+    if (roles.fy != roles.fx) disturb(roles.fy, 0, f);
+    disturb(roles.k1, 1, random.normal());
+    disturb(roles.k2, 2, random.normal());
   }
 }
 
@@ -141,13 +150,14 @@ void move_outlier(Problem& problem, std::uint64_t i, const NoiseOptions& o) {
   problem.observation_xy[2 * i + 1] += o.outlier_px * direction.sine;
 }
 
-// Distance in front of the image plane; BAL cameras look along -z.
+// Distance in front of the image plane; BAL cameras look along -z, all others along +z.
 double depth_of(const Problem& problem, const std::vector<Matrix3<double>>& rotations,
                 std::uint64_t i) {
   const std::uint32_t j = problem.observation_image[i];
   const double* X = &problem.points[3 * std::size_t{problem.observation_point[i]}];
   const Matrix3<double>& R = rotations[j];
-  return -(R[6] * X[0] + R[7] * X[1] + R[8] * X[2] + problem.poses[j].translation[2]);
+  const double z = R[6] * X[0] + R[7] * X[1] + R[8] * X[2] + problem.poses[j].translation[2];
+  return problem.cameras[problem.image_camera[j]].model == CameraModel::bal ? -z : z;
 }
 
 // Keeps the observations with a number other than kGone, under the new numbers of their points.
@@ -176,6 +186,26 @@ void keep(Problem& problem, const std::vector<bool>& kept,
   problem.observation_xy.resize(2 * to);
 }
 
+/// The metadata of the points and observations that are left.
+void keep_metadata(Problem& problem, const std::vector<bool>& kept,
+                   const std::vector<std::uint32_t>& numbers) {
+  if (problem.metadata == nullptr) return;
+  auto metadata = std::make_shared<SceneMetadata>(*problem.metadata);
+  const auto left = [](auto& list, const auto& is_kept) {
+    std::size_t to = 0;
+    for (std::size_t i = 0; i < list.size(); ++i)
+      if (is_kept(i)) list[to++] = list[i];
+    list.resize(to);
+  };
+  const auto point = [&](std::size_t i) { return numbers[i] != kGone; };
+  left(metadata->point_ids, point);
+  left(metadata->point_colours, point);
+  left(metadata->point_errors_px, point);
+  left(metadata->observation_feature,
+       [&](std::size_t i) { return kept[i] && numbers[problem.observation_point[i]] != kGone; });
+  problem.metadata = std::move(metadata);
+}
+
 void drop_near(Problem& problem, double least_depth, NoiseRecord& record) {
   std::vector<Matrix3<double>> rotations;
   for (std::size_t j = 0; j < problem.num_images(); ++j)
@@ -199,6 +229,7 @@ void drop_near(Problem& problem, double least_depth, NoiseRecord& record) {
   }
   record.dropped_points = numbers.size() - next;
   problem.points.resize(3 * std::size_t{next});
+  keep_metadata(problem, kept, numbers);
   keep(problem, kept, numbers, record.outliers);
   record.dropped_observations = observations - problem.num_observations();
 }

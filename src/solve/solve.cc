@@ -14,6 +14,7 @@
 #include "platform/memory.h"
 #include "residual/lent_observations.h"
 #include "scene/behind.h"
+#include "solve/bal_view.h"
 #include "solve/choose_solver.h"
 #include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
@@ -51,15 +52,17 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 
 Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+  if (Result<void> known = BalView::check(problem); !known.ok()) return known;
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   for (std::uint32_t i : options.fixed.pose_ids)
     if (i >= problem.num_images())
       return usage("fixed pose " + std::to_string(i) + " is not one of the " +
                    std::to_string(problem.num_images()) + " images");
-  for (std::uint32_t i : options.fixed.camera_ids)
-    if (i >= problem.cameras.size())
-      return usage("fixed camera " + std::to_string(i) + " is not one of the " +
-                   std::to_string(problem.cameras.size()) + " cameras");
+  for (const auto* ids : {&options.fixed.camera_ids, &options.fixed.k1_ids, &options.fixed.k2_ids})
+    for (std::uint32_t i : *ids)
+      if (i >= problem.cameras.size())
+        return usage("fixed camera " + std::to_string(i) + " is not one of the " +
+                     std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
   if (options.inner_iterations < 0) return usage("inner_iterations is negative");
@@ -205,7 +208,9 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   try {
-    if (Result<void> done = refine(problem, options, *kernels.value(), clock, summary); !done.ok())
+    SolveOptions resolved = options;
+    const BalView view(problem, resolved.fixed);
+    if (Result<void> done = refine(problem, resolved, *kernels.value(), clock, summary); !done.ok())
       return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
