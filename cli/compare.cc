@@ -20,6 +20,7 @@
 #include "outputs.h"
 #include "program.h"
 #include "report/comparison.h"
+#include "scene/camera_frame.h"
 #include "sheaf/sheaf.h"
 #include "solve_arguments.h"
 #include "solver_programs.h"
@@ -64,6 +65,23 @@ std::vector<SolverRun> run_all(const Arguments& arguments,
     }
   }
   return runs;
+}
+
+// What every solver reads: as a BAL file states it, a lens for each image.
+void make_bal(InputFile& input, bool quiet) {
+  if (input.format == "bal") return;
+  Problem& problem = input.problem;
+  to_bal_cameras(problem).value();
+  if (!quiet)
+    fmt::print(stderr,
+               "compared as a BAL file states it: each image has a lens f, k1, k2 of its own\n");
+  std::vector<Camera> lenses;
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    lenses.push_back(problem.cameras[problem.image_camera[j]]);
+    problem.image_camera[j] = static_cast<std::uint32_t>(j);
+  }
+  problem.cameras = std::move(lenses);
+  problem.metadata = nullptr;
 }
 
 void write_plot(const Arguments& arguments, const ComparisonRecord& record,
@@ -120,7 +138,9 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"--plot", arguments.plot}, {"--json", json}});
-  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const Json input_document = input_json(arguments.in, input);
+  make_bal(input, arguments.common.quiet);
   Problem reference;
   if (!arguments.reference.empty()) reference = read(arguments.reference).value();
   const char* folders = std::getenv("SHEAF_PEERS");
@@ -147,8 +167,7 @@ int run(const Arguments& arguments) {
         arguments, record,
         fmt::format("{}, {} thread{}", input_name(arguments.in), threads, threads == 1 ? "" : "s"));
   if (!json.empty())
-    write_json(document_of(arguments, input_json(arguments.in, input), solvers, record, total),
-               json);
+    write_json(document_of(arguments, input_document, solvers, record, total), json);
   if (setting.stop.stop_requested()) return kExitInterrupted;
   const bool any = std::any_of(record.runs.begin(), record.runs.end(),
                                [](const SolverRun& r) { return r.ran(); });
@@ -166,8 +185,7 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
                   "more folders to find peers (programs peer-NAME) in, separated by colons "
                   "[$SHEAF_PEERS]")
       ->type_name("FOLDERS");
-  verb.add_option("--reference", a.reference,
-                  "truth to hold each result against, as evaluate does: BAL")
+  verb.add_option("--reference", a.reference, "truth to hold each result against, as evaluate does")
       ->type_name("FILE");
   verb.add_option("--max-iterations", a.limits.max_iterations, "steps of each solver, at most")
       ->type_name("N")
@@ -213,9 +231,7 @@ void add_compare(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand(
       "compare", "solve a problem with every solver that is here, side by side");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
   add_compare_options(verb, *arguments);
   add_common_options(verb, arguments->common);
   verb.footer(

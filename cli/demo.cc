@@ -65,7 +65,8 @@ Json generated_input(const Problem& problem) {
                 {"format", "generated"},
                 {"compression", "none"},
                 {"bytes", 0},
-                {"sha256", nullptr}};
+                {"sha256", nullptr},
+                {"notes", Json::array()}};
   input.update(counts_json(problem));
   return input;
 }

@@ -125,7 +125,8 @@ RunSetting::RunSetting(const std::string& in, const InputFile& input, const Prob
       scratch(folder),
       stop(std::move(token)) {
   std::error_code ignored;
-  if (input.compression == "none" && fs::is_regular_file(path, ignored)) return;
+  if (input.format == "bal" && input.compression == "none" && fs::is_regular_file(path, ignored))
+    return;
   path = scratch / "problem.txt";
   write(problem, path).value();
   kill_after_s += 2e-6 * static_cast<double>(fs::file_size(path, ignored));

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "geometry/rotation.h"
+#include "scene/camera_frame.h"
 
 namespace sheaf {
 namespace {
@@ -34,6 +35,10 @@ std::vector<Vector3<double>> points_of(const Problem& problem) {
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     out.push_back({problem.points[3 * i], problem.points[3 * i + 1], problem.points[3 * i + 2]});
   return out;
+}
+
+bool looks_along_minus_z(const Problem& problem, std::size_t image) {
+  return problem.cameras[problem.image_camera[image]].model == CameraModel::bal;
 }
 
 // Below this certainty noise in the places turns the whole scene.
@@ -96,8 +101,11 @@ Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference
   const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
   for (std::size_t j = 0; j < estimate.num_images(); ++j) {
     const Pose& want = reference.poses[j];
+    Pose have = estimate.poses[j];
+    if (looks_along_minus_z(estimate, j) != looks_along_minus_z(reference, j))
+      turn_round(have, false);
     const Quaternion<double> q =
-        multiply(Quaternion<double>(estimate.poses[j].rotation), conjugate(similarity.rotation));
+        multiply(Quaternion<double>(have.rotation), conjugate(similarity.rotation));
     const Vector3<double> phi = angle_axis_from_quaternion(multiply(q, conjugate(want.rotation)));
     out.rotation_rad.push_back(distance(phi, {}));
     const Vector3<double> c = similarity(centers[j]);
@@ -105,7 +113,7 @@ Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference
     Vector3<double> t = multiply(matrix_from_quaternion(q), c);
     for (double& x : t) x = -x;
     // Unaligned, t is as it stands: through the centre it would lose digits.
-    if (!out.alignment.aligned) t = estimate.poses[j].translation;
+    if (!out.alignment.aligned) t = have.translation;
     out.translation.push_back(distance(t, want.translation));
   }
   const auto points = points_of(estimate), reference_points = points_of(reference);

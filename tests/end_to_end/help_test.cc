@@ -28,6 +28,7 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
                     "--time-to", "--runs", "--plot"});
   if (verb == "info") options.insert("--pattern");
+  if (verb == "convert") options.insert("--format");
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
