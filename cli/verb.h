@@ -26,6 +26,7 @@ inline constexpr const char* kProblemOut =
 /// Each adds its verb. A verb that ran leaves its exit code; errors are thrown as sheaf::Error.
 void add_solve(CLI::App& app, int& exit_code);
 void add_info(CLI::App& app, int& exit_code);
+void add_check(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_perturb(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "geometry/camera_model.h"
 #include "platform/random.h"
+#include "scene/subset.h"
 #include "scene/view.h"
 #include "sheaf/scene.h"
 
@@ -160,77 +160,32 @@ double depth_of(const Problem& problem, const std::vector<Matrix3<double>>& rota
   return problem.cameras[problem.image_camera[j]].model == CameraModel::bal ? -z : z;
 }
 
-// Keeps the observations with a number other than kGone, under the new numbers of their points.
-constexpr std::uint32_t kGone = UINT32_MAX;
-
-void keep(Problem& problem, const std::vector<bool>& kept,
-          const std::vector<std::uint32_t>& numbers, std::vector<std::uint64_t>& outliers) {
+// The outliers among the observations that are left, by their new numbers.
+std::vector<std::uint64_t> outliers_left(const std::vector<std::uint64_t>& outliers,
+                                         const std::vector<bool>& kept) {
+  std::vector<std::uint64_t> left;
   std::uint64_t to = 0;
   auto outlier = outliers.begin();
-  std::vector<std::uint64_t> left;
-  for (std::uint64_t i = 0; i < problem.num_observations(); ++i) {
-    const bool moved = outlier != outliers.end() && *outlier == i;
+  for (std::uint64_t i = 0; i < kept.size() && outlier != outliers.end(); ++i) {
+    const bool moved = *outlier == i;
     if (moved) ++outlier;
-    const std::uint32_t point = numbers[problem.observation_point[i]];
-    if (!kept[i] || point == kGone) continue;
-    if (moved) left.push_back(to);
-    problem.observation_image[to] = problem.observation_image[i];
-    problem.observation_point[to] = point;
-    problem.observation_xy[2 * to] = problem.observation_xy[2 * i];
-    problem.observation_xy[2 * to + 1] = problem.observation_xy[2 * i + 1];
-    ++to;
+    if (moved && kept[i]) left.push_back(to);
+    to += kept[i];
   }
-  outliers = std::move(left);
-  problem.observation_image.resize(to);
-  problem.observation_point.resize(to);
-  problem.observation_xy.resize(2 * to);
-}
-
-/// The metadata of the points and observations that are left.
-void keep_metadata(Problem& problem, const std::vector<bool>& kept,
-                   const std::vector<std::uint32_t>& numbers) {
-  if (problem.metadata == nullptr) return;
-  auto metadata = std::make_shared<SceneMetadata>(*problem.metadata);
-  const auto left = [](auto& list, const auto& is_kept) {
-    std::size_t to = 0;
-    for (std::size_t i = 0; i < list.size(); ++i)
-      if (is_kept(i)) list[to++] = list[i];
-    list.resize(to);
-  };
-  const auto point = [&](std::size_t i) { return numbers[i] != kGone; };
-  left(metadata->point_ids, point);
-  left(metadata->point_colours, point);
-  left(metadata->point_errors_px, point);
-  left(metadata->observation_feature,
-       [&](std::size_t i) { return kept[i] && numbers[problem.observation_point[i]] != kGone; });
-  problem.metadata = std::move(metadata);
+  return left;
 }
 
 void drop_near(Problem& problem, double least_depth, NoiseRecord& record) {
   std::vector<Matrix3<double>> rotations;
   for (std::size_t j = 0; j < problem.num_images(); ++j)
     rotations.push_back(portable_matrix(portable_rotation(problem, j)));
-  const std::uint64_t observations = problem.num_observations();
+  const std::uint64_t observations = problem.num_observations(), points = problem.num_points();
   std::vector<bool> kept(observations);
-  std::vector<std::uint32_t> numbers(problem.num_points(), 0);  // first counts, then new numbers
-  for (std::uint64_t i = 0; i < observations; ++i) {
+  for (std::uint64_t i = 0; i < observations; ++i)
     kept[i] = depth_of(problem, rotations, i) >= least_depth;
-    if (kept[i]) ++numbers[problem.observation_point[i]];
-  }
-  std::uint32_t next = 0;
-  for (std::size_t p = 0; p < numbers.size(); ++p) {
-    if (numbers[p] < 2) {
-      numbers[p] = kGone;
-      continue;
-    }
-    for (std::size_t k = 0; k < 3; ++k)
-      problem.points[3 * std::size_t{next} + k] = problem.points[3 * p + k];
-    numbers[p] = next++;
-  }
-  record.dropped_points = numbers.size() - next;
-  problem.points.resize(3 * std::size_t{next});
-  keep_metadata(problem, kept, numbers);
-  keep(problem, kept, numbers, record.outliers);
+  keep_observations(problem, kept, 2);
+  record.outliers = outliers_left(record.outliers, kept);
+  record.dropped_points = points - problem.num_points();
   record.dropped_observations = observations - problem.num_observations();
 }
 
