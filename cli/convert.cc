@@ -36,20 +36,24 @@ Json list_json(const std::vector<std::uint64_t>& numbers) {
 Json cleaned_json(const CleanOptions& options, const CleanRecord& record) {
   return {{"max_error_px", options.max_error_px},
           {"drop_behind", options.behind},
+          {"drop_repeated", options.repeated},
           {"min_angle_deg", options.min_angle_deg},
           {"min_track", options.min_track},
           {"observations", record.observations},
           {"far_off", list_json(record.far_off)},
           {"behind", list_json(record.behind)},
+          {"repeated", list_json(record.repeated)},
           {"narrow", list_json(record.narrow)},
           {"short_tracks", list_json(record.short_tracks)}};
 }
 
 void print_cleaned(const CleanRecord& r) {
   fmt::print(
-      "left out    {} observations: {} far off, {} behind, the others of {} points with "
+      "left out    {} observations: {} far off, {} behind, {} repeated, the others of {} points "
+      "with "
       "narrow rays and {} short tracks\n",
-      r.observations, r.far_off.size(), r.behind.size(), r.narrow.size(), r.short_tracks.size());
+      r.observations, r.far_off.size(), r.behind.size(), r.repeated.size(), r.narrow.size(),
+      r.short_tracks.size());
 }
 
 int run(const Arguments& arguments) {
@@ -92,6 +96,8 @@ void add_clean_options(CLI::App& verb, CleanOptions& clean) {
       ->check(number_in(0, 1e300, false, "a number of pixels above 0"));
   verb.add_flag("--drop-behind", clean.behind,
                 "leave out observations whose point lies behind the camera");
+  verb.add_flag("--drop-repeated", clean.repeated,
+                "leave out observations that occur twice, pixel and all");
   verb.add_option("--min-angle", clean.min_angle_deg,
                   "leave out points whose rays meet at less than this at most")
       ->type_name("DEGREES")

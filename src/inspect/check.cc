@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <map>
 #include <numeric>
-#include <utility>
 
 #include "geometry/camera_model.h"
 #include "inspect/clean.h"
@@ -150,24 +149,11 @@ void check_rank(const Problem& problem, Report& report) {
 }
 
 void check_duplicates(const Problem& problem, Report& report) {
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
-  pairs.reserve(problem.num_observations());
-  for (std::size_t i = 0; i < problem.num_observations(); ++i)
-    pairs.emplace_back(
-        std::uint64_t{problem.observation_point[i]} << 32 | problem.observation_image[i], i);
-  std::sort(pairs.begin(), pairs.end());
-  Numbers again, same;
-  for (std::size_t k = 1; k < pairs.size(); ++k) {
-    if (pairs[k].first != pairs[k - 1].first) continue;
-    const double *a = &problem.observation_xy[2 * pairs[k - 1].second],
-                 *b = &problem.observation_xy[2 * pairs[k].second];
-    (a[0] == b[0] && a[1] == b[1] ? same : again).push_back(pairs[k].second);
-  }
-  std::sort(again.begin(), again.end());
-  std::sort(same.begin(), same.end());
+  const auto [same, again] = repetitions_in(problem);
   report.add("repeated-observations", true, "observations", same,
              plural(same.size(), "observation occurs", "observations occur") +
-                 " twice, pixel and all: they count double; write the file without them");
+                 " twice, pixel and all: they count double; leave them out (convert "
+                 "--drop-repeated)");
   report.add("two-pixels", false, "observations", again,
              plural(again.size(), "observation sees", "observations see") +
                  " a point in an image that has it at another pixel too: one of the two matches is "

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "geometry/rotation.h"
 #include "scene/point_errors.h"
@@ -75,6 +76,25 @@ std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<boo
   return angles;
 }
 
+Repetitions repetitions_in(const Problem& problem) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
+  pairs.reserve(problem.num_observations());
+  for (std::size_t i = 0; i < problem.num_observations(); ++i)
+    pairs.emplace_back(
+        std::uint64_t{problem.observation_point[i]} << 32 | problem.observation_image[i], i);
+  std::sort(pairs.begin(), pairs.end());
+  Repetitions out;
+  for (std::size_t k = 1; k < pairs.size(); ++k) {
+    if (pairs[k].first != pairs[k - 1].first) continue;
+    const double* a = &problem.observation_xy[2 * pairs[k - 1].second];
+    const double* b = &problem.observation_xy[2 * pairs[k].second];
+    (a[0] == b[0] && a[1] == b[1] ? out.same_pixel : out.other_pixel).push_back(pairs[k].second);
+  }
+  std::sort(out.same_pixel.begin(), out.same_pixel.end());
+  std::sort(out.other_pixel.begin(), out.other_pixel.end());
+  return out;
+}
+
 CleanRecord clean(Problem& problem, const CleanOptions& options) {
   CleanRecord record;
   const std::size_t observations = problem.num_observations();
@@ -85,7 +105,8 @@ CleanRecord clean(Problem& problem, const CleanOptions& options) {
       if (!(lengths[i] <= options.max_error_px)) record.far_off.push_back(i);
   }
   if (options.behind) record.behind = evaluate(problem).behind;
-  for (const auto* list : {&record.far_off, &record.behind})
+  if (options.repeated) record.repeated = repetitions_in(problem).same_pixel;
+  for (const auto* list : {&record.far_off, &record.behind, &record.repeated})
     for (const std::uint64_t i : *list) kept[i] = false;
   std::vector<bool> narrow(problem.num_points(), false);
   if (options.min_angle_deg > 0) {

@@ -100,9 +100,9 @@ ColmapDraft::Refusal ColmapDraft::add_feature(double x, double y, std::uint64_t 
 ColmapDraft::Refusal ColmapDraft::add_point(std::uint64_t id, const std::array<double, 3>& xyz,
                                             const std::array<std::uint8_t, 3>& colour,
                                             double error_px) {
-  const std::string which = "of point " + std::to_string(id);
-  if (!finite(xyz)) return found("a number that is not finite", "the coordinates " + which);
-  if (!std::isfinite(error_px)) return found("a number that is not finite", "the error " + which);
+  const auto which = [id] { return " of point " + std::to_string(id); };  // built only to refuse
+  if (!finite(xyz)) return found("a number that is not finite", "the coordinates" + which());
+  if (!std::isfinite(error_px)) return found("a number that is not finite", "the error" + which());
   if (id >= kMatched) return found("point id " + std::to_string(id), "a smaller one");
   if (!point_ids_.add(id))
     return found("point id " + std::to_string(id) + " a second time", "ids that differ");
@@ -115,25 +115,27 @@ ColmapDraft::Refusal ColmapDraft::add_point(std::uint64_t id, const std::array<d
 
 ColmapDraft::Refusal ColmapDraft::add_track_element(std::uint32_t image_id, std::uint32_t feature) {
   const std::uint64_t id = metadata_.point_ids.back();
-  const std::string which = "in the track of point " + std::to_string(id);
+  const auto refuse = [&](const std::string& what, const std::string& expected) {
+    return found(what + " in the track of point " + std::to_string(id), expected);
+  };
+  const auto where = [&] {
+    return "feature " + std::to_string(feature) + " of image " + std::to_string(image_id);
+  };
   const auto image = image_of_id_.find(image_id);
   if (image == image_of_id_.end())
-    return found("image id " + std::to_string(image_id) + " " + which, "the id of an image");
+    return refuse("image id " + std::to_string(image_id), "the id of an image");
   const std::uint64_t begin = metadata_.feature_begin[image->second];
   const std::uint64_t end = image->second + 1 < metadata_.feature_begin.size()
                                 ? metadata_.feature_begin[image->second + 1]
                                 : feature_point_.size();
-  const std::string where =
-      "feature " + std::to_string(feature) + " of image " + std::to_string(image_id);
   if (feature >= end - begin)
-    return found(where + " " + which, "one of its " + std::to_string(end - begin) + " features");
+    return refuse(where(), "one of its " + std::to_string(end - begin) + " features");
   std::uint64_t& point = feature_point_[begin + feature];
   if (point != id)
-    return found(where + " " + which,
-                 point == kMatched ? "a feature that no track has listed before"
-                 : point == kNoPoint
-                     ? "a feature that names this point, not none"
-                     : "a feature that names this point, not " + std::to_string(point));
+    return refuse(where(), point == kMatched ? "a feature that no track has listed before"
+                           : point == kNoPoint
+                               ? "a feature that names this point, not none"
+                               : "a feature that names this point, not " + std::to_string(point));
   point = kMatched;
   const double* xy = &metadata_.feature_xy[2 * (begin + feature)];
   problem_.add_observation(image->second, static_cast<std::uint32_t>(problem_.num_points() - 1),

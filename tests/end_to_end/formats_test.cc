@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,30 @@ TEST_F(FormatsCommand, SolvesLikeTheFileItCameFrom) {
   EXPECT_LT(json_of(folder_ / "e.json")["rotation_error_rad"]["max"], 1e-6);
   EXPECT_LT(json_of(folder_ / "e.json")["translation_error"]["max"], 1e-4);
   EXPECT_EQ(run({"info", "refined"}).exit_code, 0);
+}
+
+/// Another program may write images and points in another order: names and ids tell them.
+TEST_F(FormatsCommand, EvaluatesModelsInAnyOrder) {
+  const Problem model = read(folder_ / "model").value();
+  Problem other;
+  auto metadata = std::make_shared<SceneMetadata>();
+  other.cameras = model.cameras;
+  for (std::size_t j = model.num_images(); j-- > 0;) {
+    other.add_image(model.poses[j], model.image_camera[j]);
+    metadata->image_names.push_back(model.metadata->image_names[j]);
+  }
+  for (std::size_t p = model.num_points(); p-- > 0;) {
+    other.add_point(model.points[3 * p], model.points[3 * p + 1], model.points[3 * p + 2]);
+    metadata->point_ids.push_back(model.metadata->point_ids[p]);
+  }
+  other.metadata = metadata;
+  write(other, folder_ / "other", {.format = "colmap"}).value();
+  ASSERT_EQ(run({"evaluate", "other", "model", "--no-align", "--json", "e.json"}).exit_code, 0);
+  EXPECT_EQ(json_of(folder_ / "e.json")["center_error"]["max"], 0);
+  EXPECT_EQ(json_of(folder_ / "e.json")["point_error"]["max"], 0);
+  metadata->image_names[0] = "another";
+  write(other, folder_ / "other", {.format = "colmap"}).value();
+  EXPECT_EQ(run({"evaluate", "other", "model"}).exit_code, 2);
 }
 
 TEST_F(FormatsCommand, PerturbsAndComparesModels) {

@@ -29,7 +29,8 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--time-to", "--runs", "--plot"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
-    options.insert({"--format", "--max-error", "--drop-behind", "--min-angle", "--min-track"});
+    options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
+                    "--min-track"});
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",

@@ -102,6 +102,8 @@ TEST(Check, FindsWhatOccursTwice) {
                     p.observation_xy[11]);
   EXPECT_EQ(only(p, "repeated-observations").first, (std::vector<std::uint64_t>{240}));
   EXPECT_EQ(only(p, "two-pixels").first, (std::vector<std::uint64_t>{241}));
+  EXPECT_EQ(clean(p, {.repeated = true}).repeated, (std::vector<std::uint64_t>{240}));
+  EXPECT_EQ(p.num_observations(), 241u);
 }
 
 TEST(Check, FindsPointsBehindNarrowRaysAbsurdFocalsAndOutliers) {

@@ -155,6 +155,8 @@ TEST(ColmapMalformed, TextFilesAreRefusedWithTheirLine) {
        "m/images.txt:2: found 'nan', expected a finite number, one of qw qx"},
       {"overflow", [](auto& f) { replace(f.images, "0.25 5.0", "1e999 5.0"); },
        "m/images.txt:2: found '1e999'"},
+      {"zero byte in a name", [](auto& f) { f.images[f.images.find("left") + 1] = '\0'; },
+       "m/images.txt:2: found a zero byte, expected the name of image 12"},
       {"half a feature", [](auto& f) { replace(f.images, " 210.25 5", " 210.25"); },
        "m/images.txt:3: found the end of the line, expected the id of a point, or -1"},
       {"point id of -2", [](auto& f) { replace(f.images, "10 20 -1", "10 20 -2"); },
