@@ -78,8 +78,9 @@ std::optional<Error> read_images_text(std::string_view text, const std::string& 
                        std::to_string(id));
     if (!in.read_integer(camera_id))
       return in.refuse("the id of the camera of image " + std::to_string(id));
-    if (in.rest().find('\0') != std::string_view::npos)
-      return in.refuse_as("found a zero byte, expected the name of image " + std::to_string(id));
+    if (in.rest().find_first_of(std::string_view("\0\r", 2)) != std::string_view::npos)
+      return in.refuse_as("found a zero byte or half a line's end, expected the name of image " +
+                          std::to_string(id));
     if (auto refusal =
             draft.add_image(id, pose, camera_id, std::string(in.rest()), in.line_number() + 1))
       return in.refuse_as(*refusal);
