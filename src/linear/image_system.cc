@@ -66,7 +66,8 @@ ImageSystem::ImageSystem(const Problem& problem, ImageBatches batches, Columns c
   lenses_free_ = false;
   for (std::size_t i = 0; i < images; ++i) {
     held_.poses.push_back({problem.poses[i].rotation, problem.poses[i].translation});
-    held_.lenses.push_back(problem.cameras[image_camera_[i]].parameters);
+    const auto& lens = problem.cameras[image_camera_[i]].parameters;
+    held_.lenses.push_back({lens[0], lens[1], lens[2]});
     const std::int32_t* c = columns_.image(i);
     lenses_free_ = lenses_free_ || std::any_of(c + 6, c + 9, [](auto k) { return k >= 0; });
   }
@@ -227,7 +228,8 @@ void ImageSystem::store(Problem& problem) const {
     problem.poses[i].rotation = held_.poses[i].rotation;
     problem.poses[i].translation = held_.poses[i].translation;
     // Images that share a lens hold it: all say the same.
-    problem.cameras[image_camera_[i]].parameters = held_.lenses[i];
+    std::copy(held_.lenses[i].begin(), held_.lenses[i].end(),
+              problem.cameras[image_camera_[i]].parameters.begin());
   }
 }
 
