@@ -20,7 +20,9 @@
 #include "outputs.h"
 #include "program.h"
 #include "report/comparison.h"
+#include "scene/camera_frame.h"
 #include "sheaf/sheaf.h"
+#include "solve_arguments.h"
 #include "solver_programs.h"
 #include "solver_run.h"
 #include "summary_text.h"
@@ -36,6 +38,7 @@ struct Arguments {
   std::string in, reference, solvers, peers, plot;
   std::vector<double> taus = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
   int runs = 1;
+  bool steps = false;
 };
 
 void tell(const Arguments& arguments, const SolverRun& run) {
@@ -64,6 +67,23 @@ std::vector<SolverRun> run_all(const Arguments& arguments,
   return runs;
 }
 
+// What every solver reads: as a BAL file states it, a lens for each image.
+void make_bal(InputFile& input, bool quiet) {
+  if (input.format == "bal") return;
+  Problem& problem = input.problem;
+  to_bal_cameras(problem).value();
+  if (!quiet)
+    fmt::print(stderr,
+               "compared as a BAL file states it: each image has a lens f, k1, k2 of its own\n");
+  std::vector<Camera> lenses;
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    lenses.push_back(problem.cameras[problem.image_camera[j]]);
+    problem.image_camera[j] = static_cast<std::uint32_t>(j);
+  }
+  problem.cameras = std::move(lenses);
+  problem.metadata = nullptr;
+}
+
 void write_plot(const Arguments& arguments, const ComparisonRecord& record,
                 const std::string& title) {
   std::vector<std::pair<std::string, CostTrace>> curves;
@@ -86,7 +106,8 @@ Json document_of(const Arguments& arguments, const Json& input, const SolverList
           {"problem", input},
           {"options",
            {{"threads", record.threads},
-            {"tolerance", kCompareTolerance},
+            {"tolerance", limits.tolerance},
+            {"fix", limits.fix.empty() ? Json() : Json(limits.fix)},
             {"max_iterations", limits.max_iterations},
             {"time_limit_s", limits.time_s},
             {"runs", arguments.runs},
@@ -103,9 +124,11 @@ void print(const Arguments& arguments, const Problem& problem, const SolverList&
   fmt::print(
       "{} thread{}; each solver ends after two accepted steps that decrease the cost by less than "
       "{:g} of it, {} steps or {:g} s\n",
-      record.threads, record.threads == 1 ? "" : "s", kCompareTolerance,
+      record.threads, record.threads == 1 ? "" : "s", arguments.limits.tolerance,
       arguments.limits.max_iterations, arguments.limits.time_s);
+  if (!arguments.limits.fix.empty()) fmt::print("held: {}\n", arguments.limits.fix);
   fmt::print("best cost {:.10g}\n\n{}", record.best, comparison_text(record));
+  if (arguments.steps) fmt::print("\n{}\n", steps_table(record));
   for (const MissingSolver& solver : solvers.missing)
     fmt::print("not here: {}: {}\n", solver.name, solver.how);
 }
@@ -115,13 +138,17 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"--plot", arguments.plot}, {"--json", json}});
-  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const Json input_document = input_json(arguments.in, input);
+  make_bal(input, arguments.common.quiet);
   Problem reference;
   if (!arguments.reference.empty()) reference = read(arguments.reference).value();
   const char* folders = std::getenv("SHEAF_PEERS");
+  Fixed fixed;
+  if (!arguments.limits.fix.empty()) parse_fix(arguments.limits.fix, fixed);
   const SolverList solvers = find_solvers(
       arguments.solvers, !arguments.peers.empty() || folders == nullptr ? arguments.peers : folders,
-      input.problem);
+      input.problem, fixed);
   if (!arguments.reference.empty()) list_errors(input.problem, reference, AlignBy::nothing).value();
 
   const int threads = arguments.common.threads > 0
@@ -140,8 +167,7 @@ int run(const Arguments& arguments) {
         arguments, record,
         fmt::format("{}, {} thread{}", input_name(arguments.in), threads, threads == 1 ? "" : "s"));
   if (!json.empty())
-    write_json(document_of(arguments, input_json(arguments.in, input), solvers, record, total),
-               json);
+    write_json(document_of(arguments, input_document, solvers, record, total), json);
   if (setting.stop.stop_requested()) return kExitInterrupted;
   const bool any = std::any_of(record.runs.begin(), record.runs.end(),
                                [](const SolverRun& r) { return r.ran(); });
@@ -159,8 +185,7 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
                   "more folders to find peers (programs peer-NAME) in, separated by colons "
                   "[$SHEAF_PEERS]")
       ->type_name("FOLDERS");
-  verb.add_option("--reference", a.reference,
-                  "truth to hold each result against, as evaluate does: BAL")
+  verb.add_option("--reference", a.reference, "truth to hold each result against, as evaluate does")
       ->type_name("FILE");
   verb.add_option("--max-iterations", a.limits.max_iterations, "steps of each solver, at most")
       ->type_name("N")
@@ -171,6 +196,21 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("SECONDS")
       ->check(number_in(0, 1e6, false, "a number of seconds above 0"))
       ->capture_default_str();
+  verb.add_option("--tolerance", a.limits.tolerance,
+                  "each solver ends after two accepted steps in a row that decrease the cost by "
+                  "less than this part of it")
+      ->type_name("T")
+      ->check(number_in(0, std::numeric_limits<double>::max(), true, "a number from 0 up"))
+      ->capture_default_str();
+  verb.add_option("--fix", a.limits.fix,
+                  "what every solver holds, as in solve; one that cannot is a row that says so")
+      ->type_name("LIST")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            Fixed ignored;
+            return parse_fix(text, ignored);
+          },
+          ""));
   verb.add_option("--time-to", a.taus, "times until the cost is within these parts of the best")
       ->type_name("TAUS")
       ->delimiter(',')
@@ -180,6 +220,8 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("N")
       ->check(whole_number_from(1, "a whole number from 1 up"))
       ->capture_default_str();
+  verb.add_flag("--steps", a.steps,
+                "also a table of each step: seconds, chi2, which were rejected");
   verb.add_option("--plot", a.plot, "cost against time, as SVG")->type_name("FILE");
 }
 
@@ -189,16 +231,16 @@ void add_compare(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand(
       "compare", "solve a problem with every solver that is here, side by side");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
   add_compare_options(verb, *arguments);
   add_common_options(verb, arguments->common);
   verb.footer(
       "Example:\n  sheaf compare problem.txt --solvers sheaf,sheaf:sparse --threads 1 --plot "
       "compare.svg\n"
       "\nWith every peer that is installed, and errors against a known truth:\n"
-      "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json");
+      "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json\n"
+      "\nPoses and lenses alone, step by step:\n"
+      "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -110,6 +110,36 @@ std::string comparison_text(const ComparisonRecord& record) {
   return out;
 }
 
+std::string steps_table(const ComparisonRecord& record) {
+  std::vector<const SolverRun*> shown;
+  std::size_t longest = 0;
+  for (const std::size_t i : median_runs(record.runs))
+    if (record.runs[i].ran()) {
+      shown.push_back(&record.runs[i]);
+      longest = std::max(longest, shown.back()->trace.size());
+    }
+  std::vector<Row> rows = {{"step"}};
+  for (const SolverRun* run : shown) rows[0].push_back(label_of(*run));
+  for (std::size_t k = 0; k < longest; ++k) {
+    Row row = {std::to_string(k)};
+    for (const SolverRun* run : shown) {
+      const CostTrace& trace = run->trace;
+      if (k >= trace.size()) {
+        row.push_back("");
+      } else if (k == 0) {
+        row.push_back(fmt::format("{:.10g}", 2 * trace[0].second));
+      } else {
+        const double seconds = trace[k].first - trace[k - 1].first;
+        const bool accepted = trace[k].second != trace[k - 1].second;
+        row.push_back(accepted ? fmt::format("{:.3g} s {:.10g}", seconds, 2 * trace[k].second)
+                               : fmt::format("{:.3g} s rejected", seconds));
+      }
+    }
+    rows.push_back(row);
+  }
+  return aligned(rows) + "Seconds of each step, chi2 = sum |r|^2 held after it.\n";
+}
+
 Json runs_json(const ComparisonRecord& record) {
   const std::vector<std::size_t> shown = median_runs(record.runs);
   Json out = Json::array();

@@ -21,6 +21,9 @@ struct ComparisonRecord {
 /// A line for each solver: its run of median total time.
 std::string comparison_text(const ComparisonRecord& record);
 
+/// A column for each solver's median run: seconds and chi2 of each step, which were rejected.
+std::string steps_table(const ComparisonRecord& record);
+
 /// The list `runs` of docs/json.md.
 Json runs_json(const ComparisonRecord& record);
 

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <algorithm>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "inspect/clean.h"
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
@@ -19,30 +21,90 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
-  std::string in, out;
+  std::string in, out, format;
+  CleanOptions clean;
 };
+
+Json list_json(const std::vector<std::uint64_t>& numbers) {
+  constexpr std::size_t kMostListed = 1000;
+  const std::size_t listed = std::min(numbers.size(), kMostListed);
+  return {{"count", numbers.size()},
+          {"first", std::vector<std::uint64_t>(
+                        numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(listed))}};
+}
+
+Json cleaned_json(const CleanOptions& options, const CleanRecord& record) {
+  return {{"max_error_px", options.max_error_px},
+          {"drop_behind", options.behind},
+          {"drop_repeated", options.repeated},
+          {"min_angle_deg", options.min_angle_deg},
+          {"min_track", options.min_track},
+          {"observations", record.observations},
+          {"far_off", list_json(record.far_off)},
+          {"behind", list_json(record.behind)},
+          {"repeated", list_json(record.repeated)},
+          {"narrow", list_json(record.narrow)},
+          {"short_tracks", list_json(record.short_tracks)}};
+}
+
+void print_cleaned(const CleanRecord& r) {
+  fmt::print(
+      "left out    {} observations: {} far off, {} behind, {} repeated, the others of {} points "
+      "with "
+      "narrow rays and {} short tracks\n",
+      r.observations, r.far_off.size(), r.behind.size(), r.repeated.size(), r.narrow.size(),
+      r.short_tracks.size());
+}
 
 int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"OUT", arguments.out}, {"--json", json}});
-  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const Json before = input_json(arguments.in, input);
+  const std::string counts = counts_text(input.problem);
+  CleanRecord cleaned;
+  if (arguments.clean.any()) cleaned = clean(input.problem, arguments.clean);
+  const std::string format =
+      arguments.format.empty() ? write_format(input.problem, arguments.out) : arguments.format;
   interrupt.begin_write();
   const Timer writing;
-  write(input.problem, arguments.out).value();
+  write(input.problem, arguments.out, {.format = format}).value();
   const double write_s = writing.seconds();
-  fmt::print("{}: {}\nwrote       {}\n", arguments.in, counts_text(input.problem), arguments.out);
+  fmt::print("{}: {}\n", arguments.in, counts);
+  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
+  if (arguments.clean.any()) print_cleaned(cleaned);
+  fmt::print("wrote       {} ({})\n", arguments.out, format);
+  print_losses(format, input.problem);
   if (json.empty()) return 0;
-  std::error_code ignored;
   const Json document = {
       {"version", SHEAF_VERSION},
-      {"input", input_json(arguments.in, input)},
-      {"output",
-       {{"path", arguments.out}, {"bytes", std::filesystem::file_size(arguments.out, ignored)}}},
+      {"input", before},
+      {"cleaned", cleaned_json(arguments.clean, cleaned)},
+      {"output", {{"path", arguments.out}, {"format", format}, {"bytes", bytes_at(arguments.out)}}},
+      {"dropped", lost_in(format, input.problem)},
       {"time", {{"read_s", input.read_s}, {"write_s", write_s}, {"total_s", total.seconds()}}}};
   write_json(document, json);
   return 0;
+}
+
+void add_clean_options(CLI::App& verb, CleanOptions& clean) {
+  verb.add_option("--max-error", clean.max_error_px,
+                  "leave out observations whose residual is longer, or not finite")
+      ->type_name("PX")
+      ->check(number_in(0, 1e300, false, "a number of pixels above 0"));
+  verb.add_flag("--drop-behind", clean.behind,
+                "leave out observations whose point lies behind the camera");
+  verb.add_flag("--drop-repeated", clean.repeated,
+                "leave out observations that occur twice, pixel and all");
+  verb.add_option("--min-angle", clean.min_angle_deg,
+                  "leave out points whose rays meet at less than this at most")
+      ->type_name("DEGREES")
+      ->check(number_in(0, 180, false, "an angle above 0, degrees"));
+  verb.add_option("--min-track", clean.min_track, "leave out points with fewer observations left")
+      ->type_name("N")
+      ->check(whole_number_from(1, "a whole number from 1 up"));
 }
 
 }  // namespace
@@ -50,16 +112,20 @@ int run(const Arguments& arguments) {
 void add_convert(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand("convert", "read a problem and write it in another format");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
-  verb.add_option("OUT", arguments->out,
-                  "NAME.ply is a point cloud with cameras, anything else BAL; NAME.gz and NAME.bz2 "
-                  "are compressed")
-      ->type_name("FILE")
-      ->required();
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
+  verb.add_option("OUT", arguments->out, kProblemOut)->type_name("FILE")->required();
+  verb.add_option("--format", arguments->format,
+                  "write this whatever the name: bal, colmap (binary), colmap-text, bundler, nvm "
+                  "or ply; what it does not hold is said")
+      ->type_name("NAME")
+      ->check(one_of({"bal", "colmap", "colmap-text", "bundler", "nvm", "ply"}));
+  add_clean_options(verb, arguments->clean);
   add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf convert problem.txt problem.ply");
+  verb.footer(
+      "Example:\n  sheaf convert problem.txt problem.ply\n"
+      "\nA COLMAP model as text:\n  sheaf convert model/ readable --format colmap-text\n"
+      "\nWithout what misleads a solver:\n"
+      "  sheaf convert model/ clean --max-error 8 --drop-behind --min-angle 1.5 --min-track 2");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

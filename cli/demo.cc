@@ -61,11 +61,8 @@ void tell_end(const SceneOptions& scene, const Problem& problem, const Summary& 
 }
 
 Json generated_input(const Problem& problem) {
-  Json input = {{"path", nullptr},
-                {"format", "generated"},
-                {"compression", "none"},
-                {"bytes", 0},
-                {"sha256", nullptr}};
+  Json input = {{"path", nullptr}, {"format", "generated"}, {"compression", "none"},
+                {"bytes", 0},      {"sha256", nullptr},     {"notes", Json::array()}};
   input.update(counts_json(problem));
   return input;
 }

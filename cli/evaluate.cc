@@ -78,7 +78,7 @@ void add_evaluate(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand(
       "evaluate", "how far an estimate's poses and points are from a reference");
-  verb.add_option("EST", arguments->estimate, "estimate: BAL, plain or .gz or .bz2")
+  verb.add_option("EST", arguments->estimate, "estimate: a file or folder, as in convert")
       ->type_name("FILE")
       ->required();
   verb.add_option("REF", arguments->reference,

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "sheaf/error.h"
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -81,6 +82,20 @@ void print_histogram(const Statistics& statistics) {
     fmt::print("{:>11}  {:>9}  {}\n", label, points, std::string(points * 40 / most, '#'));
 }
 
+std::map<std::string, std::size_t> lenses_of(const Problem& problem) {
+  std::map<std::string, std::size_t> counts;
+  for (const Camera& camera : problem.cameras) ++counts[std::string(to_string(camera.model))];
+  return counts;
+}
+
+// "1 SIMPLE_RADIAL, 2 OPENCV"
+std::string lenses_text(const Problem& problem) {
+  std::string out;
+  for (const auto& [model, count] : lenses_of(problem))
+    out += fmt::format("{}{} {}", out.empty() ? "" : ", ", count, model);
+  return out;
+}
+
 void print(const std::string& path, const InputFile& input, const Statistics& statistics,
            const Evaluation& evaluation) {
   const Range& images = statistics.observations_per_image;
@@ -89,8 +104,11 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   fmt::print("{}: {}\n", path, counts_text(input.problem));
   fmt::print("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
              input.read_s);
+  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
+  fmt::print("lenses      {}\n", lenses_text(input.problem));
   fmt::print("cost        {:.9e}\n", evaluation.cost);
-  fmt::print("rms         {:.6g} px\n", evaluation.rms_px);
+  fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
+             evaluation.rms_px, statistics.mean_error_px);
   fmt::print("behind      {} observations behind their camera\n", evaluation.behind.size());
   if (!evaluation.not_finite.empty())
     fmt::print("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
@@ -119,8 +137,12 @@ int run(const Arguments& arguments) {
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION}, {"input", input_json(arguments.in, input)}};
   document.update(statistics_json(statistics));
+  document["lenses"] = Json::array();
+  for (const auto& [model, count] : lenses_of(input.problem))
+    document["lenses"].push_back({{"model", model}, {"count", count}});
   document["cost"] = number(evaluation.cost);
   document["rms_px"] = number(evaluation.rms_px);
+  document["mean_error_px"] = number(statistics.mean_error_px);
   document["behind_camera"] = observations_json(evaluation.behind, input.problem);
   document["not_finite"] = observations_json(evaluation.not_finite, input.problem);
   document["pattern"] = pattern_json(arguments.pattern, pattern);
@@ -137,9 +159,7 @@ void add_info(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb =
       *app.add_subcommand("info", "what is in a problem, and how well it fits as it is");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
   verb.add_option("--pattern", arguments->pattern,
                   "also draw the network of images and the patterns of Jacobian, Hessian and "
                   "reduced camera matrix, as PNG")

@@ -90,11 +90,8 @@ Json counts_json(const Problem& problem) {
 }
 
 Json input_json(const std::string& path, const InputFile& input) {
-  Json out = {{"path", path},
-              {"format", input.format},
-              {"compression", input.compression},
-              {"bytes", input.bytes},
-              {"sha256", input.sha256}};
+  Json out = {{"path", path},         {"format", input.format}, {"compression", input.compression},
+              {"bytes", input.bytes}, {"sha256", input.sha256}, {"notes", input.notes}};
   out.update(counts_json(input.problem));
   return out;
 }

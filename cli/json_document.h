@@ -10,7 +10,7 @@
 #include "sheaf/io.h"
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 #include "solve_arguments.h"
 
 namespace sheaf {

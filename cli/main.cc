@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   sheaf::add_solve(app, exit_code);
   sheaf::add_info(app, exit_code);
+  sheaf::add_check(app, exit_code);
   sheaf::add_convert(app, exit_code);
   sheaf::add_perturb(app, exit_code);
   sheaf::add_evaluate(app, exit_code);

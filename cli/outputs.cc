@@ -24,8 +24,23 @@ void check_outputs(const std::vector<NamedOutput>& outputs) {
                     fmt::format("{} and {} name the same file, {}", outputs[j].option,
                                 outputs[i].option, outputs[i].path));
     }
-    check_writable(outputs[i].path).value();
+    check_writable(outputs[i].path, outputs[i].model).value();
   }
+}
+
+std::uint64_t bytes_at(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return fs::file_size(path, ignored);
+  std::uint64_t bytes = 0;
+  for (const auto& entry : fs::directory_iterator(path, ignored))
+    if (entry.is_regular_file(ignored)) bytes += entry.file_size(ignored);
+  return bytes;
+}
+
+void print_losses(const std::string& format, const Problem& problem) {
+  for (const std::string& sentence : lost_in(format, problem))
+    fmt::print("dropped     {}\n", sentence);
 }
 
 }  // namespace sheaf

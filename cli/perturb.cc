@@ -48,6 +48,7 @@ void print(const Arguments& arguments, const Problem& problem, const NoiseOption
   fmt::print("cost        {:.9e} -> {:.9e}\n", effect.before.cost, effect.after.cost);
   fmt::print("rms         {:.6g} -> {:.6g} px\n", effect.before.rms_px, effect.after.rms_px);
   fmt::print("wrote       {}\n", arguments.out);
+  print_losses(write_format(problem, arguments.out), problem);
 }
 
 Json document_of(const Arguments& arguments, const NoiseOptions& noise, const Json& input,
@@ -57,11 +58,9 @@ Json document_of(const Arguments& arguments, const NoiseOptions& noise, const Js
   if (noise.normalize_to > 0)
     normalization = {{"center", record.normalization.center},
                      {"scale", record.normalization.scale}};
-  std::error_code ignored;
   Json document = {{"version", SHEAF_VERSION}, {"input", input}};
   document["options"] = noise_json(noise);
-  document["output"] = {{"path", arguments.out},
-                        {"bytes", std::filesystem::file_size(arguments.out, ignored)}};
+  document["output"] = {{"path", arguments.out}, {"bytes", bytes_at(arguments.out)}};
   document["output"].update(counts_json(problem));
   document["normalization"] = normalization;
   document["outliers"] = observations_json(record.outliers, problem);
@@ -77,7 +76,7 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"OUT", arguments.out}, {"--json", json}});
+  check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
   const NoiseOptions noise = noise_options(arguments.noise);
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);
@@ -102,12 +101,8 @@ int run(const Arguments& arguments) {
 void add_perturb(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand("perturb", "add noise and outliers to a problem");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
-  verb.add_option("OUT", arguments->out,
-                  "the disturbed problem; NAME.ply is a point cloud with cameras, anything else "
-                  "BAL, NAME.gz and NAME.bz2 compressed")
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
+  verb.add_option("OUT", arguments->out, std::string("the disturbed problem; ") + kProblemOut)
       ->type_name("FILE")
       ->required();
   add_noise_options(verb, arguments->noise);

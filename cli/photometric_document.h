@@ -7,7 +7,7 @@
 #include "json_document.h"
 #include "photometric_arguments.h"
 #include "sheaf/photometric.h"
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 

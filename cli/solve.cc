@@ -60,7 +60,7 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const bool wants_json = !arguments.common.json.empty();
   check_outputs(
-      {{"-o", arguments.out}, {"--json", arguments.common.json}, {"--ply", arguments.ply}});
+      {{"-o", arguments.out, true}, {"--json", arguments.common.json}, {"--ply", arguments.ply}});
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
 
@@ -102,6 +102,8 @@ int run(const Arguments& arguments) {
     written.push_back(arguments.common.json);
   }
   if (!written.empty()) fmt::print("wrote       {}\n", fmt::join(written, ", "));
+  if (summary.usable() && !arguments.out.empty())
+    print_losses(write_format(problem, arguments.out), problem);
   return exit_code_of(summary.termination);
 }
 
@@ -110,13 +112,9 @@ int run(const Arguments& arguments) {
 void add_solve(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand("solve", "refine camera poses, intrinsics and points");
-  verb.add_option("IN", arguments->in, "problem: BAL, plain or .gz or .bz2 (told by content)")
-      ->type_name("FILE")
-      ->required();
-  verb.add_option(
-          "-o,--output", arguments->out,
-          "write the refined problem; NAME.ply is a point cloud with cameras, anything else "
-          "BAL, NAME.gz and NAME.bz2 compressed")
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
+  verb.add_option("-o,--output", arguments->out,
+                  std::string("write the refined problem; ") + kProblemOut)
       ->type_name("OUT");
   verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
       ->type_name("FILE");

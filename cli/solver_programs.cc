@@ -48,13 +48,15 @@ Programs find_programs(const std::string& folders) {
 }
 
 // What a peer does best with at this size, as far as bench/ has measured it.
-std::string usual_config(const std::string& name, const Problem& problem) {
+std::string usual_config(const std::string& name, const Problem& problem, const Fixed& fixed) {
   const std::size_t images = problem.num_images();
   if (name.rfind("ceres", 0) == 0)
-    return images <= 150    ? "dense_schur-analytic"
+    return fixed.points     ? "sparse_normal-analytic"
+           : images <= 150  ? "dense_schur-analytic"
            : images <= 2000 ? "sparse_schur-analytic"
                             : "iterative_implicit-analytic";
   if (name.rfind("g2o", 0) == 0) return "eigen-lambda=1e-2";
+  if (name.rfind("colmap", 0) == 0) return images <= 50 ? "dense" : "sparse";
   if (name.rfind("gtsam", 0) == 0) return "cholesky-metis-ceres";
   if (name.rfind("rootba", 0) == 0) return "schur-double";
   if (name.rfind("pba", 0) == 0) return "float";
@@ -69,14 +71,16 @@ std::string how_to_install(const std::string& name) {
   if (name == "g2o")
     return "build and install https://github.com/RainerKuemmerle/g2o; then " + build;
   if (name == "gtsam") return "pip install gtsam; then " + build;
+  if (name == "colmap") return "pip install pycolmap; then " + build;
   return fmt::format("no program peer-{} was found: see bench/README.md for how peers are built",
                      name);
 }
 
 void add_solver(const std::string& name, const std::string& config, const Programs& programs,
-                const Problem& problem, SolverList& out) {
+                const Problem& problem, const Fixed& fixed, SolverList& out) {
   const auto add = [&](const std::string& full, const fs::path& program) {
-    out.found.push_back({full, config.empty() ? usual_config(full, problem) : config, program});
+    out.found.push_back(
+        {full, config.empty() ? usual_config(full, problem, fixed) : config, program});
   };
   if (name == "sheaf") return add(name, own_program());
   if (const auto exact = programs.find(name); exact != programs.end())
@@ -96,14 +100,15 @@ fs::path own_program() {
   return path;
 }
 
-SolverList find_solvers(const std::string& list, const std::string& folders,
-                        const Problem& problem) {
+SolverList find_solvers(const std::string& list, const std::string& folders, const Problem& problem,
+                        const Fixed& fixed) {
   const Programs programs = find_programs(folders);
   SolverList out;
   if (list.empty()) {
-    add_solver("sheaf", "", programs, problem, out);
-    for (const auto& [name, program] : programs) add_solver(name, "", programs, problem, out);
-    for (const std::string name : {"ceres", "g2o", "gtsam"}) {
+    add_solver("sheaf", "", programs, problem, fixed, out);
+    for (const auto& [name, program] : programs)
+      add_solver(name, "", programs, problem, fixed, out);
+    for (const std::string name : {"ceres", "g2o", "gtsam", "colmap"}) {
       const auto has = [&](const SolverProgram& s) { return s.name.rfind(name, 0) == 0; };
       if (std::none_of(out.found.begin(), out.found.end(), has))
         out.missing.push_back({name, how_to_install(name)});
@@ -115,7 +120,8 @@ SolverList find_solvers(const std::string& list, const std::string& folders,
     const std::string name = item.substr(0, colon);
     if (name.empty())
       throw Error(ErrorCode::usage, "--solvers: expected NAME[:CONFIG],..., not '" + list + "'");
-    add_solver(name, colon < item.size() ? item.substr(colon + 1) : "", programs, problem, out);
+    add_solver(name, colon < item.size() ? item.substr(colon + 1) : "", programs, problem, fixed,
+               out);
   }
   return out;
 }

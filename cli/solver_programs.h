@@ -32,9 +32,10 @@ struct SolverList {
 /// peers that are found. A NAME without a program of that name stands for all whose names begin so
 /// ("ceres": "ceres-2.1"). Peers (programs peer-NAME) are looked for in `folders`
 /// (colon-separated), then in ../libexec/sheaf and bench/peers beside this command. Throws Error
-/// (ErrorCode::usage) for an entry without a name.
-SolverList find_solvers(const std::string& list, const std::string& folders,
-                        const Problem& problem);
+/// (ErrorCode::usage) for an entry without a name. `fixed`: what is held, for the configuration
+/// that a peer takes where none is stated.
+SolverList find_solvers(const std::string& list, const std::string& folders, const Problem& problem,
+                        const Fixed& fixed);
 
 /// This command's own file.
 std::filesystem::path own_program();

@@ -10,6 +10,7 @@
 
 #include "json_document.h"
 #include "program.h"
+#include "solve_arguments.h"
 
 namespace sheaf {
 namespace {
@@ -32,25 +33,24 @@ std::vector<std::string> sheaf_words(const SolverProgram& solver, const RunSetti
                                     "--time-limit",
                                     fmt::format("{}", setting.limits.time_s),
                                     "--tolerance",
-                                    fmt::format("{}", kCompareTolerance)};
+                                    fmt::format("{}", setting.limits.tolerance)};
+  if (!setting.limits.fix.empty()) words.insert(words.end(), {"--fix", setting.limits.fix});
   const std::vector<std::string> more = solve_words(solver.config);
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
 
 std::vector<std::string> peer_words(const SolverProgram& solver, const RunSetting& setting) {
-  return {solver.program,
-          setting.path,
-          "--config",
-          solver.config,
-          "--threads",
-          std::to_string(setting.threads),
-          "--max-iterations",
-          std::to_string(setting.limits.max_iterations),
-          "--time-limit",
-          fmt::format("{}", setting.limits.time_s),
-          "--out",
-          setting.scratch / "final.txt"};
+  std::vector<std::string> words = {
+      solver.program,     setting.path,
+      "--config",         solver.config,
+      "--threads",        std::to_string(setting.threads),
+      "--max-iterations", std::to_string(setting.limits.max_iterations),
+      "--time-limit",     fmt::format("{}", setting.limits.time_s),
+      "--tolerance",      fmt::format("{}", setting.limits.tolerance)};
+  if (!setting.limits.fix.empty()) words.insert(words.end(), {"--fix", setting.limits.fix});
+  words.insert(words.end(), {"--out", setting.scratch / "final.txt"});
+  return words;
 }
 
 // The trace of `sheaf solve --json`: the cost held after every step.
@@ -95,6 +95,12 @@ void judge(const fs::path& final, const RunSetting& setting, SolverRun& run) {
   state.observation_image = problem.observation_image;
   state.observation_point = problem.observation_point;
   state.observation_xy = problem.observation_xy;
+  Fixed fixed;
+  if (!setting.limits.fix.empty()) parse_fix(setting.limits.fix, fixed);
+  if (const std::string moved = what_moved(problem, state, fixed); !moved.empty()) {
+    run.failed = "it moved " + moved + ", which it was to hold";
+    return;
+  }
   const Evaluation evaluation = evaluate(state);
   run.final_cost_independent = evaluation.cost;
   if (!evaluation.not_finite.empty())
@@ -119,7 +125,8 @@ RunSetting::RunSetting(const std::string& in, const InputFile& input, const Prob
       scratch(folder),
       stop(std::move(token)) {
   std::error_code ignored;
-  if (input.compression == "none" && fs::is_regular_file(path, ignored)) return;
+  if (input.format == "bal" && input.compression == "none" && fs::is_regular_file(path, ignored))
+    return;
   path = scratch / "problem.txt";
   write(problem, path).value();
   kill_after_s += 2e-6 * static_cast<double>(fs::file_size(path, ignored));

@@ -12,13 +12,14 @@
 
 namespace sheaf {
 
-/// The one stopping rule of all solvers: two accepted steps in a row that decrease the cost by less
-/// than this part of it.
-inline constexpr double kCompareTolerance = 1e-12;
-
+/// When each solver ends, and what it holds.
 struct RunLimits {
   int max_iterations = 50;
   double time_s = 60;
+  /// The one stopping rule of all: two accepted steps in a row that decrease the cost by less than
+  /// this part of it.
+  double tolerance = 1e-12;
+  std::string fix;  ///< as in `sheaf solve --fix`; may be empty
 };
 
 /// What the runs of one comparison have in common. Peers read plain BAL text: a compressed input is

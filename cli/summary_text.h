@@ -5,7 +5,7 @@
 #include <string>
 
 #include "sheaf/problem.h"
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 

@@ -3,6 +3,7 @@
 //
 // Ceres on a BAL file. The words of --config:
 //   dense_schur | sparse_schur | iterative_implicit | iterative_explicit    the camera solver
+//   dense_normal | sparse_normal  normal equations without elimination: for cameras or points alone
 //   analytic | auto               derivatives by hand or by Ceres' jets
 //   jacobi | schur_jacobi         preconditioner of the iterative ones (schur_jacobi)
 //   lapack                        dense factorisation by LAPACK instead of Eigen
@@ -10,7 +11,8 @@
 //   eta=0.1  radius=1e4           forcing, first trust region radius
 //   huber=1.5 | soft_l1=1.5 | cauchy=1.5 | tukey=1.5    a loss with its scale in pixels
 //   inner                         inner iterations of the points, as sheaf takes
-//   nok2                          holds k2, as sheaf's --fix k2
+//   nok2                          holds k2, as --fix k2
+// --fix takes points, poses, intrinsics, f, k1, k2.
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
@@ -149,6 +151,10 @@ bool choose_solver(peer::Config& config, ceres::Solver::Options& options) {
     options.linear_solver_type = ceres::DENSE_SCHUR;
   } else if (config.has("sparse_schur")) {
     options.linear_solver_type = ceres::SPARSE_SCHUR;
+  } else if (config.has("dense_normal")) {
+    options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  } else if (config.has("sparse_normal")) {
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   } else if (config.has("iterative_implicit") || config.has("iterative_explicit")) {
     options.linear_solver_type = ceres::ITERATIVE_SCHUR;
     options.use_explicit_schur_complement = config.has("iterative_explicit");
@@ -178,9 +184,38 @@ ceres::LossFunction* choose_loss(peer::Config& config) {
 
 /// What a run adds to Ceres' solver options.
 struct Words {
-  bool analytic, hold_k2, inner;
+  bool analytic, inner, hold_points;
+  std::vector<int> held;  // of a camera's nine parameters
   ceres::LossFunction* loss;
 };
+
+std::vector<int> held_parameters(const std::set<std::string>& fix, bool hold_k2) {
+  const std::vector<std::pair<std::string, std::vector<int>>> meanings = {
+      {"poses", {0, 1, 2, 3, 4, 5}},
+      {"intrinsics", {6, 7, 8}},
+      {"f", {6}},
+      {"k1", {7}},
+      {"k2", {8}}};
+  std::set<int> out;
+  for (const auto& [word, parameters] : meanings)
+    if (fix.count(word) > 0) out.insert(parameters.begin(), parameters.end());
+  if (hold_k2) out.insert(8);
+  return {out.begin(), out.end()};
+}
+
+/// What --fix and the words hold.
+void hold(const std::vector<double*>& blocks, const Words& words, ceres::Problem& problem) {
+  const bool whole = words.held.size() == camera_size;
+  ceres::Manifold* part =
+      words.held.empty() || whole ? nullptr : new ceres::SubsetManifold(camera_size, words.held);
+  for (double* block : blocks) {
+    const bool camera = problem.ParameterBlockSize(block) == camera_size;
+    if (camera ? whole : words.hold_points)
+      problem.SetParameterBlockConstant(block);
+    else if (camera && part != nullptr)
+      problem.SetManifold(block, part);
+  }
+}
 
 void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
            ceres::Solver::Options& options) {
@@ -198,7 +233,8 @@ void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
   problem.GetParameterBlocks(&blocks);
   for (double* block : blocks)
     order->AddElementToGroup(block, problem.ParameterBlockSize(block) == 3 ? 0 : 1);
-  options.linear_solver_ordering = order;
+  // Ceres takes the order for Schur's elimination, or as a fill-reducing one, which it has itself.
+  if (ceres::IsSchurType(options.linear_solver_type)) options.linear_solver_ordering = order;
   options.use_inner_iterations = words.inner;
   if (words.inner) {
     options.inner_iteration_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -206,17 +242,14 @@ void build(peer::BalFile& file, const Words& words, ceres::Problem& problem,
       if (problem.ParameterBlockSize(block) == 3)
         options.inner_iteration_ordering->AddElementToGroup(block, 0);
   }
-  if (!words.hold_k2) return;
-  auto* without_k2 = new ceres::SubsetManifold(camera_size, {8});
-  for (double* block : blocks)
-    if (problem.ParameterBlockSize(block) == camera_size) problem.SetManifold(block, without_k2);
+  hold(blocks, words, problem);
 }
 
 int solve(const peer::Arguments& arguments) {
   peer::Config config(arguments.config);
   ceres::Solver::Options options;
-  const Words words{config.has("analytic"), config.has("nok2"), config.has("inner"),
-                    choose_loss(config)};
+  const Words words{config.has("analytic"), config.has("inner"), arguments.fix.count("points") > 0,
+                    held_parameters(arguments.fix, config.has("nok2")), choose_loss(config)};
   const bool known = choose_solver(config, options) && words.analytic != config.has("auto");
   if (!known || !config.unknown().empty()) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
@@ -253,5 +286,7 @@ int solve(const peer::Arguments& arguments) {
 int main(int argc, char** argv) {
   peer::Arguments arguments;
   if (!peer::parse_arguments(argc, argv, arguments)) return 2;
+  const std::set<std::string> able = {"points", "poses", "intrinsics", "f", "k1", "k2"};
+  if (!peer::can_hold("Ceres", arguments, able)) return 2;
   return arguments.test ? test_derivatives() : solve(arguments);
 }

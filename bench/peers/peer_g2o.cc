@@ -5,7 +5,13 @@
 // hand. The words of --config:
 //   eigen | cholmod               linear solver of the reduced camera matrix
 //   lambda=1e-2                   first damping (g2o's own rule when absent)
+//   vertices                      points that are held stay vertices of the graph, marked as fixed;
+//                                 without it they are constants of edges with one vertex, which is
+//                                 quicker
+// --fix takes points, intrinsics. A step that g2o tries and refuses within one of its iterations is
+// a step of its own here, as it is with every other solver.
 #include <g2o/core/base_binary_edge.h>
+#include <g2o/core/base_unary_edge.h>
 #include <g2o/core/base_vertex.h>
 #include <g2o/core/block_solver.h>
 #include <g2o/core/hyper_graph_action.h>
@@ -31,19 +37,21 @@ struct Camera {
   double lens[3];  // f, k1, k2
 };
 
-class CameraVertex final : public g2o::BaseVertex<9, Camera> {
+/// Size 9, or 6 with the lens held.
+template <int Size>
+class CameraVertex final : public g2o::BaseVertex<Size, Camera> {
  public:
-  void setToOriginImpl() override { _estimate = {{{1, 0, 0, 0, 1, 0, 0, 0, 1}, {}}, {}}; }
+  void setToOriginImpl() override { this->_estimate = {{{1, 0, 0, 0, 1, 0, 0, 0, 1}, {}}, {}}; }
   void oplusImpl(const double* step) override {  // turn, translation, lens
     using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    Camera& camera = this->_estimate;
     Matrix turn;
     peer::rotation(step, turn.data(), nullptr);
-    Eigen::Map<Matrix> R(_estimate.pose.R);
+    Eigen::Map<Matrix> R(camera.pose.R);
     R = (turn * R).eval();
-    for (int i = 0; i < 3; ++i) {
-      _estimate.pose.t[i] += step[3 + i];
-      _estimate.lens[i] += step[6 + i];
-    }
+    for (int i = 0; i < 3; ++i) camera.pose.t[i] += step[3 + i];
+    if constexpr (Size == 9)
+      for (int i = 0; i < 3; ++i) camera.lens[i] += step[6 + i];
   }
   bool read(std::istream&) override { return false; }
   bool write(std::ostream&) const override { return false; }
@@ -57,48 +65,119 @@ class PointVertex final : public g2o::BaseVertex<3, g2o::Vector3> {
   bool write(std::ostream&) const override { return false; }
 };
 
-class Observation final : public g2o::BaseBinaryEdge<2, g2o::Vector2, CameraVertex, PointVertex> {
+/// The derivatives by a camera's step into `J` (2 x its size), and by P = R X + t into by_P.
+template <class Matrix>
+void fill_camera(const Camera& camera, const double* X, const double* measured, Matrix& J,
+                 double* by_P) {
+  double P[3], residual[2];
+  peer::Derivatives d;
+  peer::project(camera.pose, camera.lens, X, measured, P, residual, &d);
+  const double* t = camera.pose.t;
+  const double q[3] = {P[0] - t[0], P[1] - t[1], P[2] - t[2]};
+  for (int r = 0; r < 2; ++r) {
+    double turn[3];
+    peer::times_minus_cross(d.by_P + 3 * r, q, turn);
+    for (int j = 0; j < 3; ++j) {
+      J(r, j) = turn[j];
+      J(r, 3 + j) = d.by_P[3 * r + j];
+      if constexpr (Matrix::ColsAtCompileTime == 9) J(r, 6 + j) = d.by_lens[3 * r + j];
+    }
+  }
+  std::copy(d.by_P, d.by_P + 6, by_P);
+}
+
+template <int Size>
+class Observation final
+    : public g2o::BaseBinaryEdge<2, g2o::Vector2, CameraVertex<Size>, PointVertex> {
  public:
   void computeError() override {
     double P[3];
-    peer::project(camera().pose, camera().lens, point().data(), _measurement.data(), P,
-                  _error.data(), nullptr);
+    peer::project(camera().pose, camera().lens, point().data(), this->_measurement.data(), P,
+                  this->_error.data(), nullptr);
   }
   void linearizeOplus() override {
-    double P[3], residual[2];
-    peer::Derivatives d;
-    const peer::Pose& pose = camera().pose;
-    peer::project(pose, camera().lens, point().data(), _measurement.data(), P, residual, &d);
-    const double q[3] = {P[0] - pose.t[0], P[1] - pose.t[1], P[2] - pose.t[2]};
-    for (int r = 0; r < 2; ++r) {
-      double turn[3];
-      peer::times_minus_cross(d.by_P + 3 * r, q, turn);
-      for (int j = 0; j < 3; ++j) {
-        _jacobianOplusXi(r, j) = turn[j];
-        _jacobianOplusXi(r, 3 + j) = d.by_P[3 * r + j];
-        _jacobianOplusXi(r, 6 + j) = d.by_lens[3 * r + j];
-        _jacobianOplusXj(r, j) = d.by_P[3 * r] * pose.R[j] + d.by_P[3 * r + 1] * pose.R[3 + j] +
-                                 d.by_P[3 * r + 2] * pose.R[6 + j];
-      }
-    }
+    double by_P[6];
+    fill_camera(camera(), point().data(), this->_measurement.data(), this->_jacobianOplusXi, by_P);
+    if (static_cast<const PointVertex*>(this->_vertices[1])->fixed()) return;
+    const double* R = camera().pose.R;
+    for (int r = 0; r < 2; ++r)
+      for (int j = 0; j < 3; ++j)
+        this->_jacobianOplusXj(r, j) =
+            by_P[3 * r] * R[j] + by_P[3 * r + 1] * R[3 + j] + by_P[3 * r + 2] * R[6 + j];
   }
   bool read(std::istream&) override { return false; }
   bool write(std::ostream&) const override { return false; }
 
  private:
   const Camera& camera() const {
-    return static_cast<const CameraVertex*>(_vertices[0])->estimate();
+    return static_cast<const CameraVertex<Size>*>(this->_vertices[0])->estimate();
   }
   const g2o::Vector3& point() const {
-    return static_cast<const PointVertex*>(_vertices[1])->estimate();
+    return static_cast<const PointVertex*>(this->_vertices[1])->estimate();
   }
+};
+
+/// Of a point that is held.
+template <int Size>
+class HeldObservation final : public g2o::BaseUnaryEdge<2, g2o::Vector2, CameraVertex<Size>> {
+ public:
+  explicit HeldObservation(const double* X) : X_{X[0], X[1], X[2]} {}
+  void computeError() override {
+    double P[3];
+    peer::project(camera().pose, camera().lens, X_, this->_measurement.data(), P,
+                  this->_error.data(), nullptr);
+  }
+  void linearizeOplus() override {
+    double by_P[6];
+    fill_camera(camera(), X_, this->_measurement.data(), this->_jacobianOplusXi, by_P);
+  }
+  bool read(std::istream&) override { return false; }
+  bool write(std::ostream&) const override { return false; }
+
+ private:
+  const Camera& camera() const {
+    return static_cast<const CameraVertex<Size>*>(this->_vertices[0])->estimate();
+  }
+  double X_[3];
+};
+
+/// When the linear solver was asked: once for each try of a step.
+class Tries {
+ public:
+  explicit Tries(const peer::RunRecord& record) : record_(record) {}
+  void begin() { begun_s_.push_back(record_.now()); }
+  /// Seconds of all tries but the last, which is what the iteration ends with.
+  std::vector<double> take_refused() {
+    std::vector<double> out;
+    for (std::size_t k = 1; k < begun_s_.size(); ++k) out.push_back(begun_s_[k] - begun_s_[k - 1]);
+    begun_s_.clear();
+    return out;
+  }
+
+ private:
+  const peer::RunRecord& record_;
+  std::vector<double> begun_s_;
+};
+
+template <template <class> class Solver, class Matrix>
+class Watched final : public Solver<Matrix> {
+ public:
+  explicit Watched(Tries& tries) : tries_(tries) {}
+  bool solve(const g2o::SparseBlockMatrix<Matrix>& A, double* x, double* b) override {
+    tries_.begin();
+    return Solver<Matrix>::solve(A, x, b);
+  }
+
+ private:
+  Tries& tries_;
 };
 
 /// Records the cost after each step; the flag ends the run at the target or the time limit.
 class Watch final : public g2o::HyperGraphAction {
  public:
-  Watch(g2o::SparseOptimizer& graph, peer::RunRecord& record, const peer::Arguments& arguments)
-      : graph_(graph), record_(record), arguments_(arguments) {
+  Watch(g2o::SparseOptimizer& graph, Tries& tries, peer::RunRecord& record,
+        const peer::Arguments& arguments)
+      : graph_(graph), tries_(tries), record_(record), arguments_(arguments) {
     graph_.setForceStopFlag(&stop_);
   }
   g2o::HyperGraphAction* operator()(const g2o::HyperGraph*, Parameters*) override {
@@ -110,36 +189,45 @@ class Watch final : public g2o::HyperGraphAction {
     graph_.computeActiveErrors();  // those of the last trial may be left
     const double cost = 0.5 * graph_.activeChi2();
     record_.resume();
-    record_.add(cost);
+    record_.add_with_tries(cost, tries_.take_refused());
     stop_ = record_.over(arguments_);
   }
 
  private:
   g2o::SparseOptimizer& graph_;
+  Tries& tries_;
   peer::RunRecord& record_;
   const peer::Arguments& arguments_;
   bool stop_ = false;
 };
 
-using Blocks = g2o::BlockSolver<g2o::BlockSolverTraits<9, 3>>;
+/// What the words and --fix ask for.
+struct Plan {
+  bool cholmod, eigen;
+  double lambda;
+  bool hold_points, as_vertices;
+};
 
-std::unique_ptr<Blocks> choose_solver(peer::Config& config) {
+template <int Size>
+std::unique_ptr<g2o::Solver> choose_solver(const Plan& plan, Tries& tries) {
+  using Blocks = g2o::BlockSolver<g2o::BlockSolverTraits<Size, 3>>;
+  using Matrix = typename Blocks::PoseMatrixType;
 #ifdef PEER_G2O_CHOLMOD
-  if (config.has("cholmod")) {
-    auto linear = std::make_unique<g2o::LinearSolverCholmod<Blocks::PoseMatrixType>>();
+  if (plan.cholmod) {
+    auto linear = std::make_unique<Watched<g2o::LinearSolverCholmod, Matrix>>(tries);
     linear->setBlockOrdering(true);
     return std::make_unique<Blocks>(std::move(linear));
   }
 #endif
-  if (!config.has("eigen")) return nullptr;
-  auto linear = std::make_unique<g2o::LinearSolverEigen<Blocks::PoseMatrixType>>();
+  if (!plan.eigen) return nullptr;
+  auto linear = std::make_unique<Watched<g2o::LinearSolverEigen, Matrix>>(tries);
   linear->setBlockOrdering(true);
   return std::make_unique<Blocks>(std::move(linear));
 }
 
-void build(const peer::BalFile& file, g2o::SparseOptimizer& graph) {
-  const int cameras = file.camera_count(), points = file.point_count();
-  for (int i = 0; i < cameras; ++i) {
+template <int Size>
+void add_cameras(const peer::BalFile& file, g2o::SparseOptimizer& graph) {
+  for (int i = 0; i < file.camera_count(); ++i) {
     const double* values = &file.cameras[9 * i];
     Camera camera;
     peer::rotation(values, camera.pose.R, nullptr);
@@ -147,32 +235,48 @@ void build(const peer::BalFile& file, g2o::SparseOptimizer& graph) {
       camera.pose.t[j] = values[3 + j];
       camera.lens[j] = values[6 + j];
     }
-    auto* vertex = new CameraVertex;
+    auto* vertex = new CameraVertex<Size>;
     vertex->setId(i);
     vertex->setEstimate(camera);
     graph.addVertex(vertex);
   }
-  for (int i = 0; i < points; ++i) {
-    auto* vertex = new PointVertex;
-    vertex->setId(cameras + i);
-    vertex->setEstimate(g2o::Vector3::ConstMapType(&file.points[3 * i]));
-    vertex->setMarginalized(true);
-    graph.addVertex(vertex);
-  }
-  for (const auto& o : file.observations) {
-    auto* edge = new Observation;
+}
+
+template <int Size>
+void build(const peer::BalFile& file, const Plan& plan, g2o::SparseOptimizer& graph) {
+  add_cameras<Size>(file, graph);
+  const int cameras = file.camera_count();
+  const auto add = [&](auto* edge, const peer::BalFile::Observation& o) {
     edge->setVertex(0, graph.vertex(o.camera));
-    edge->setVertex(1, graph.vertex(cameras + o.point));
     edge->setMeasurement({o.u, o.v});
     edge->setInformation(g2o::Matrix2::Identity());
     graph.addEdge(edge);
+  };
+  if (plan.hold_points && !plan.as_vertices) {
+    for (const auto& o : file.observations)
+      add(new HeldObservation<Size>(&file.points[3 * o.point]), o);
+    return;
+  }
+  for (int i = 0; i < file.point_count(); ++i) {
+    auto* vertex = new PointVertex;
+    vertex->setId(cameras + i);
+    vertex->setEstimate(g2o::Vector3::ConstMapType(&file.points[3 * i]));
+    vertex->setFixed(plan.hold_points);
+    vertex->setMarginalized(!plan.hold_points);
+    graph.addVertex(vertex);
+  }
+  for (const auto& o : file.observations) {
+    auto* edge = new Observation<Size>;
+    edge->setVertex(1, graph.vertex(cameras + o.point));
+    add(edge, o);
   }
 }
 
-void store(const g2o::SparseOptimizer& graph, peer::BalFile& file) {
-  const int cameras = file.camera_count(), points = file.point_count();
+template <int Size>
+void store(const g2o::SparseOptimizer& graph, const Plan& plan, peer::BalFile& file) {
+  const int cameras = file.camera_count();
   for (int i = 0; i < cameras; ++i) {
-    const auto& camera = static_cast<const CameraVertex*>(graph.vertex(i))->estimate();
+    const auto& camera = static_cast<const CameraVertex<Size>*>(graph.vertex(i))->estimate();
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(camera.pose.R);
     const Eigen::AngleAxisd turn(Eigen::Quaterniond(Eigen::Matrix3d(R)).normalized());
     for (int j = 0; j < 3; ++j) {
@@ -181,43 +285,56 @@ void store(const g2o::SparseOptimizer& graph, peer::BalFile& file) {
       file.cameras[9 * i + 6 + j] = camera.lens[j];
     }
   }
-  for (int i = 0; i < points; ++i) {
+  if (plan.hold_points) return;
+  for (int i = 0; i < file.point_count(); ++i) {
     const auto& X = static_cast<const PointVertex*>(graph.vertex(cameras + i))->estimate();
     for (int j = 0; j < 3; ++j) file.points[3 * i + j] = X[j];
   }
 }
 
-int solve(const peer::Arguments& arguments) {
-  peer::Config config(arguments.config);
-  auto blocks = choose_solver(config);
-  const double lambda = config.value("lambda", 0);
-  if (!blocks || !config.unknown().empty()) {
+template <int Size>
+int solve(const peer::Arguments& arguments, const Plan& plan) {
+  peer::RunRecord record;
+  Tries tries(record);
+  auto blocks = choose_solver<Size>(plan, tries);
+  if (!blocks) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
     return 2;
   }
   peer::BalFile file;
   if (!peer::read_bal(arguments.input, file)) return 3;
 
-  peer::RunRecord record;
   record.start();
   g2o::SparseOptimizer graph;
   auto* levenberg = new g2o::OptimizationAlgorithmLevenberg(std::move(blocks));
-  if (lambda > 0) levenberg->setUserLambdaInit(lambda);
+  if (plan.lambda > 0) levenberg->setUserLambdaInit(plan.lambda);
   graph.setAlgorithm(levenberg);
-  build(file, graph);
+  build<Size>(file, plan, graph);
   graph.initializeOptimization();
   record.setup_done();
-  auto* watch = new Watch(graph, record, arguments);
+  auto* watch = new Watch(graph, tries, record, arguments);
   watch->record();
   graph.addPostIterationAction(watch);
   graph.optimize(arguments.max_iterations);
   record.finish();
-  store(graph, file);
+  store<Size>(graph, plan, file);
   if (!arguments.output.empty() && !peer::write_bal(arguments.output, file)) return 6;
   std::fputs(record.json("g2o", arguments).c_str(), stdout);
   graph.removePostIterationAction(watch);
   delete watch;
   return 0;
+}
+
+int solve(const peer::Arguments& arguments) {
+  peer::Config config(arguments.config);
+  const Plan plan{config.has("cholmod"), config.has("eigen"), config.value("lambda", 0),
+                  arguments.fix.count("points") > 0, config.has("vertices")};
+  if (!config.unknown().empty()) {
+    std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
+    return 2;
+  }
+  return arguments.fix.count("intrinsics") > 0 ? solve<6>(arguments, plan)
+                                               : solve<9>(arguments, plan);
 }
 
 }  // namespace
@@ -229,5 +346,6 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "g2o's derivatives are those that peer-ceres --test checks\n");
     return 2;
   }
+  if (!peer::can_hold("g2o", arguments, {"points", "intrinsics"})) return 2;
   return solve(arguments);
 }

@@ -158,6 +158,7 @@ int solve(const peer::Arguments& arguments) {
 int main(int argc, char** argv) {
   peer::Arguments arguments;
   if (!peer::parse_arguments(argc, argv, arguments)) return 2;
+  if (!peer::can_hold("PBA", arguments, {})) return 2;
   if (arguments.test) {
     std::fprintf(stderr, "PBA has derivatives of its own: nothing to test here\n");
     return 2;

@@ -146,6 +146,7 @@ int solve(const peer::Arguments& arguments) {
 int main(int argc, char** argv) {
   peer::Arguments arguments;
   if (!peer::parse_arguments(argc, argv, arguments)) return 2;
+  if (!peer::can_hold("rootba", arguments, {})) return 2;
   if (arguments.test) {
     std::fprintf(stderr, "rootba has derivatives of its own: nothing to test here\n");
     return 2;

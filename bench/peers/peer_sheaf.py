@@ -24,6 +24,8 @@ def parse_arguments():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--max-iterations", type=int, default=50)
     parser.add_argument("--time-limit", type=float, default=0)
+    parser.add_argument("--fix", default="")
+    parser.add_argument("--tolerance", type=float, default=1e-12, help="the peers' stopping rule")
     parser.add_argument("--cost-target", type=float, help="not used: the run ends by itself")
     parser.add_argument("--out")
     return parser.parse_args()
@@ -32,7 +34,9 @@ def parse_arguments():
 def command_line(a, json_path):
     line = [os.environ.get("SHEAF_COMMAND", "sheaf"), "solve", a.input, "--json", json_path,
             "--quiet", "--threads", str(a.threads), "--max-iterations", str(a.max_iterations),
-            "--tolerance", "1e-12"]  # the peers' stopping rule
+            "--tolerance", str(a.tolerance)]
+    if a.fix:
+        line += ["--fix", a.fix]
     if a.time_limit > 0:
         line += ["--time-limit", str(a.time_limit)]
     if a.out:

@@ -34,6 +34,13 @@ long peak_bytes() {
   return 0;
 }
 
+std::set<std::string> split(const std::string& text, char separator) {
+  std::set<std::string> out;
+  std::istringstream pieces(text);
+  for (std::string piece; std::getline(pieces, piece, separator);) out.insert(piece);
+  return out;
+}
+
 }  // namespace
 
 bool parse_arguments(int argc, char** argv, Arguments& a) {
@@ -50,6 +57,10 @@ bool parse_arguments(int argc, char** argv, Arguments& a) {
       const char* value = argv[++i];
       if (name == "--config")
         a.config = value;
+      else if (name == "--fix")
+        a.fix = split(value, ',');
+      else if (name == "--tolerance")
+        a.tolerance = std::atof(value);
       else if (name == "--out")
         a.output = value;
       else if (name == "--threads")
@@ -67,11 +78,21 @@ bool parse_arguments(int argc, char** argv, Arguments& a) {
   good = good && (a.test || !a.input.empty()) && a.threads > 0;
   if (!good)
     std::fprintf(stderr,
-                 "usage: %s IN.txt --config NAME [--threads N] [--max-iterations K]\n"
-                 "         [--time-limit SECONDS] [--cost-target COST] [--out FINAL.txt]\n"
+                 "usage: %s IN.txt --config NAME [--fix LIST] [--threads N] [--max-iterations K]\n"
+                 "         [--time-limit SECONDS] [--tolerance T] [--cost-target COST]\n"
+                 "         [--out FINAL.txt]\n"
                  "       %s --test\n",
                  argv[0], argv[0]);
   return good;
+}
+
+bool can_hold(const char* peer, const Arguments& a, const std::set<std::string>& able) {
+  for (const std::string& word : a.fix)
+    if (able.count(word) == 0) {
+      std::fprintf(stderr, "%s here cannot hold %s\n", peer, word.c_str());
+      return false;
+    }
+  return true;
 }
 
 Config::Config(const std::string& text) {
@@ -121,10 +142,19 @@ void RunRecord::resume() { paused_s_ += wall_s() - pause_begin_s_; }
 void RunRecord::add(double cost, bool accepted) { add_at(now(), cost, accepted); }
 
 void RunRecord::add_at(double time_s, double cost, bool accepted) {
-  if (accepted && !trace_.empty())
-    still_ = trace_.back().second - cost <= 1e-12 * cost ? still_ + 1 : 0;
+  if (accepted && !trace_.empty()) {
+    decrease_before_ = decrease_;
+    decrease_ = cost > 0 ? (trace_.back().second - cost) / cost : 0;
+  }
   // What was tried and refused is nobody's state.
   trace_.emplace_back(time_s, accepted || trace_.empty() ? cost : trace_.back().second);
+}
+
+void RunRecord::add_with_tries(double cost, const std::vector<double>& refused_s) {
+  const double end_s = now();
+  double time_s = trace_.empty() ? end_s : trace_.back().first;
+  for (const double seconds : refused_s) add_at(time_s += seconds, cost, false);
+  add_at(end_s, cost, true);
 }
 
 void RunRecord::finish() {
@@ -133,7 +163,8 @@ void RunRecord::finish() {
 }
 
 bool RunRecord::over(const Arguments& a) const {
-  return (still_ >= 2 && !in_float_) || now() >= a.time_limit_s ||
+  const bool still = decrease_ <= a.tolerance && decrease_before_ <= a.tolerance;
+  return (still && (!in_float_ || a.tolerance >= 1e-6)) || now() >= a.time_limit_s ||
          (!trace_.empty() && trace_.back().second <= a.cost_target);
 }
 

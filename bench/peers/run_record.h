@@ -14,16 +14,21 @@ namespace peer {
 
 struct Arguments {
   std::string input, output, config;
+  std::set<std::string> fix;  ///< what is held, in the words of `sheaf solve --fix`
   int threads = 1;
   int max_iterations = 50;
   double time_limit_s = std::numeric_limits<double>::infinity();
-  double cost_target = -1;  ///< stop once the cost is at or below it
-  bool test = false;        ///< check the derivatives instead of solving
+  double cost_target = -1;   ///< stop once the cost is at or below it
+  double tolerance = 1e-12;  ///< and after two accepted steps with no more decrease than this part
+  bool test = false;         ///< check the derivatives instead of solving
 };
 
-/// IN --config NAME --threads N --max-iterations K --time-limit S --out FILE --cost-target C
-/// False with the usage on stderr.
+/// IN --config NAME --fix LIST --threads N --max-iterations K --time-limit S --tolerance T
+/// --out FILE --cost-target C. False with the usage on stderr.
 bool parse_arguments(int argc, char** argv, Arguments& arguments);
+
+/// False, with words on stderr, when more is to be held than `able` names.
+bool can_hold(const char* peer, const Arguments& arguments, const std::set<std::string>& able);
 
 /// A configuration is words joined by '-', some with a value: "dense_schur-analytic-eta=0.1".
 class Config {
@@ -50,21 +55,25 @@ class RunRecord {
   void resume();
   void add(double cost, bool accepted = true);             ///< cost of the state held now
   void add_at(double time_s, double cost, bool accepted);  ///< by the peer's own clock
-  void finish();                                           ///< the solver returned
+  /// A peer's step with the tries that it refused inside: seconds of each. They are steps of their
+  /// own in the trace, and the accepted one has what is left of the time.
+  void add_with_tries(double cost, const std::vector<double>& refused_s);
+  void finish();                                ///< the solver returned
   void counts_in_float() { in_float_ = true; }  ///< costs and states are rounded to float
 
-  /// Target reached, time spent, or two accepted steps with a relative decrease below 1e-12: the
-  /// one stopping rule of all solvers, far below what is compared. (Costs in float cannot show such
-  /// a decrease: they are not asked.)
+  /// Target reached, time spent, or two accepted steps in a row whose relative decrease is at most
+  /// the tolerance: the one stopping rule of all solvers. (Costs in float cannot show a decrease of
+  /// less than their rounding: they are not asked below 1e-6.)
   bool over(const Arguments& arguments) const;
   std::string json(const std::string& solver, const Arguments& arguments) const;
 
  private:
   std::vector<std::pair<double, double>> trace_;  // time_s, cost
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
   double start_s_ = 0, paused_s_ = 0, pause_begin_s_ = 0, setup_s_ = 0, total_s_ = 0;
   double cpu_start_s_ = 0, cpu_s_ = 0;
   bool in_float_ = false;
-  int still_ = 0;  // accepted steps in a row that decreased next to nothing
+  double decrease_ = infinity, decrease_before_ = infinity;  // relative, of the last accepted steps
 };
 
 }  // namespace peer

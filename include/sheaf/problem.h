@@ -5,8 +5,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "sheaf/camera.h"
 #include "sheaf/error.h"
 
 namespace sheaf {
@@ -17,15 +20,32 @@ struct Pose {
   std::array<double, 3> translation{0, 0, 0};  ///< t, scene units
 };
 
-/// Which formula maps a point in the camera's frame to pixels.
-enum class CameraModel : std::uint8_t {
-  bal,  ///< f, k1, k2: p = -X.xy / X.z, n = |p|^2, u = f (1 + k1 n + k2 n^2) p; looks along -z
-};
+struct SourceFiles;
 
-/// Intrinsics of one lens.
-struct Camera {
-  CameraModel model = CameraModel::bal;
-  std::array<double, 3> parameters{1, 0, 0};  ///< bal: f (px), k1, k2
+/// What a file says of a scene beyond what is solved, kept so that it can be written again; no
+/// solver looks at it. Each list is empty (not known), or has one entry for each image, lens, point
+/// or observation of the problem.
+struct SceneMetadata {
+  std::vector<std::uint32_t> camera_ids;  ///< as the file numbers lenses
+  std::vector<std::uint32_t> image_ids;
+  std::vector<std::string> image_names;
+  std::vector<std::uint64_t> point_ids;
+  std::vector<std::array<std::uint8_t, 3>> point_colours;  ///< red, green, blue
+  std::vector<double> point_errors_px;  ///< mean |r| of a point's observations, as stated
+
+  /// Number of each observation's feature among those of its image.
+  std::vector<std::uint32_t> observation_feature;
+  /// All features of the images, observed or not: those of image j begin at feature_begin[j] (one
+  /// entry more than images), two coordinates each.
+  std::vector<std::uint64_t> feature_begin;
+  std::vector<double> feature_xy;
+
+  /// Rotations as the file stated them, where that is neither a unit quaternion nor angle-axis: 4
+  /// (quaternion w, x, y, z of another length) or 9 (matrix, row-major) for each image.
+  std::vector<double> stated_rotations;
+
+  std::uint64_t state_hash = 0;               ///< of the state as read: `state_hash(problem)`
+  std::shared_ptr<const SourceFiles> source;  ///< what only the file's own format can hold
 };
 
 /// A bundle adjustment problem as flat arrays. Observation i is of point `observation_point[i]` in
@@ -45,6 +65,9 @@ struct Problem {
   /// what a writer puts out for each pose whose quaternion is still the one they convert to, so
   /// that a rotation that was not touched comes back bit for bit.
   std::vector<double> bal_angle_axis;
+
+  /// Ids, names, colours and features that came with the file; may be null. Copies share it.
+  std::shared_ptr<const SceneMetadata> metadata;
 
   std::size_t num_images() const { return poses.size(); }
   std::size_t num_points() const { return points.size() / 3; }
@@ -66,10 +89,11 @@ struct Fixed {
   bool k2 = false;                        ///< second radial coefficient of all cameras
   std::vector<std::uint32_t> pose_ids;    ///< single poses, by image index
   std::vector<std::uint32_t> camera_ids;  ///< single lenses, all their parameters, by camera index
+  std::vector<std::uint32_t> k1_ids, k2_ids;  ///< single lenses' first or second coefficient
 };
 
-/// Checks sizes, index ranges, finite numbers and unit quaternions (to 1e-6). The message names
-/// the first offending entry.
+/// Checks sizes, index ranges, finite numbers and unit quaternions (to 1e-6); of the metadata the
+/// sizes. The message names the first offending entry.
 Result<void> validate(const Problem& problem);
 
 /// Cost 1/2 sum |r|^2 of the plain (not robust) problem by straightforward scalar code, with
@@ -77,10 +101,14 @@ Result<void> validate(const Problem& problem);
 struct Evaluation {
   double cost = 0;                    ///< 1/2 sum |r|^2, px^2
   double rms_px = 0;                  ///< sqrt(sum |r|^2 / observations): per observation
-  std::vector<std::uint64_t> behind;  ///< observations whose point lies behind the camera
+  std::vector<std::uint64_t> behind;  ///< observations whose point lies behind the camera, or
+                                      ///< beyond what a wide lens's formula is meant for
   std::vector<std::uint64_t>
       not_finite;  ///< observations whose residual is not finite; not in cost
 };
 Evaluation evaluate(const Problem& problem);
+
+/// 64 bits that differ, but for chance, between any two states, lenses or measurements.
+std::uint64_t state_hash(const Problem& problem);
 
 }  // namespace sheaf

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sheaf/camera.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 #include "sheaf/loss.h"
@@ -10,4 +11,3 @@
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
-#include "sheaf/summary.h"

@@ -2,13 +2,104 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "sheaf/error.h"
+#include "sheaf/loss.h"
 #include "sheaf/options.h"
 #include "sheaf/photometric.h"
 #include "sheaf/problem.h"
-#include "sheaf/summary.h"
 
 namespace sheaf {
+
+/// One trust region step. Index 0 is the start: no trial, accepted.
+struct Iteration {
+  int index = 0;
+  int round = 0;          ///< of the loss's scale: index into Summary::rounds
+  double start_cost = 0;  ///< of the state held before the step, with the scale of its round
+  double cost = 0;        ///< of the state held after the step
+  double trial_cost = 0;  ///< of the state tried; may be infinite or NaN
+  bool accepted = true;
+  double damping = 0;       ///< lambda the step was computed with
+  double radius = 0;        ///< px: of the step in the metric of diag(J^T J); infinite: none (lm)
+  bool reused = false;      ///< dogleg after a rejection: nothing was linearised or factored anew
+  double gain_ratio = 0;    ///< actual / predicted decrease
+  double gradient_max = 0;  ///< px; largest |J_i^T r| / |J_i| over the free columns, at the state
+                            ///< the step starts from, points eliminated
+  double step_norm = 0;     ///< largest relative change of any one block
+  int linear_iterations = 0;
+  double time_s = 0;  ///< since set-up ended
+};
+
+enum class Termination {
+  cost_converged,      ///< relative decrease below the tolerance twice
+  gradient_converged,  ///< scaled gradient below its tolerance
+  step_converged,      ///< no block moves by more than rounding
+  max_iterations,
+  time_limit,
+  stopped,         ///< by the callback or the stop token
+  no_usable_step,  ///< no step could be computed or accepted from the start
+};
+
+/// "cost_converged", ... : stable, for JSON.
+const char* to_string(Termination termination);
+
+/// Steps that were made with one scale of the loss. Within a round costs only fall; between two
+/// they mean different things.
+struct LossRound {
+  double scale_px = 0;      ///< 0 without a loss
+  double sigma_px = 0;      ///< that an automatic scale was set for; 0: the scale was given
+  double initial_cost = 0;  ///< with this scale, of the state that the round starts from
+  double final_cost = 0;
+  int steps = 0;  ///< tried, rejected ones included
+};
+
+/// What happened. Costs are 1/2 sum rho(|r|^2) in px^2; without a loss rho(s) = s.
+struct Summary {
+  double initial_cost = 0;        ///< with the first round's scale
+  double final_cost = 0;          ///< with the last round's
+  double initial_plain_cost = 0;  ///< 1/2 sum |r|^2, whatever the loss
+  double final_plain_cost = 0;
+  double initial_rms_px = 0;  ///< per observation, of the plain residuals
+  double final_rms_px = 0;
+  Termination termination = Termination::no_usable_step;
+  std::string words;  ///< the reason for stopping, as a sentence
+  std::vector<Iteration> iterations;
+  LossKind loss = LossKind::none;
+  std::vector<LossRound> rounds;  ///< without a loss one
+  double final_sigma_px = 0;      ///< estimated at the end, for an automatic scale
+
+  std::string solver;                ///< "dense", ...
+  std::string solver_reason;         ///< one line: why this one
+  std::string precision = "double";  ///< or "mixed": float inside the linear solver
+  std::string simd;                  ///< instruction set used
+  int threads = 1;
+  std::uint64_t forecast_bytes = 0;  ///< predicted peak resident size of the process
+
+  double setup_s = 0;  ///< sorting, indexing, allocating
+  double solve_s = 0;  ///< after set-up
+
+  std::vector<std::uint64_t> behind_camera_before;  ///< observation indices
+  std::vector<std::uint64_t> behind_camera_after;
+  std::vector<std::uint64_t> rejected_observations;  ///< left out (Cheirality::hold_out)
+
+  bool usable() const { return termination != Termination::no_usable_step; }
+};
+
+/// What a photometric refinement did. Costs are 1/2 sum rho in grey levels squared, and where
+/// Summary says px its numbers are grey levels here.
+struct PhotometricSummary {
+  Summary solve;
+  std::uint64_t patches_total = 0;    ///< a point in an image that is not its host
+  std::uint64_t patches_visible = 0;  ///< of them, those that counted at the start
+  std::uint64_t patches_left = 0;     ///< of those, the ones that are outside at the end
+  /// Of the residuals of the patches visible at the start, read bilinearly, brightness as it was
+  /// and as it became. A patch that left counts as much as it did, and no less than the mean did.
+  double initial_rms_grey = 0, final_rms_grey = 0;
+  double initial_median_grey = 0, final_median_grey = 0;  ///< of |r|
+};
 
 /// Refines the problem in place. The best state found is stored even when the run was stopped.
 /// Throws Error (ErrorCode::usage) for a problem that `validate` refuses or options that

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "scene/point_errors.h"
+
 namespace sheaf {
 namespace {
 
@@ -43,13 +45,25 @@ Statistics statistics_of(const Problem& problem) {
   std::vector<double> focal;
   for (const Camera& camera : problem.cameras) focal.push_back(camera.parameters[0]);
   out.focal_px = range_of(std::move(focal));
+  double sum = 0;
+  std::size_t known = 0;
+  for (const double error : mean_point_errors(problem))
+    if (error >= 0) sum += error, ++known;
+  if (known > 0) out.mean_error_px = sum / static_cast<double>(known);
   return out;
 }
 
 std::uint64_t size_bytes(const Problem& p) {
-  return bytes_of(p.poses) + bytes_of(p.image_camera) + bytes_of(p.cameras) + bytes_of(p.points) +
-         bytes_of(p.observation_image) + bytes_of(p.observation_point) +
-         bytes_of(p.observation_xy) + bytes_of(p.bal_angle_axis);
+  const std::uint64_t arrays = bytes_of(p.poses) + bytes_of(p.image_camera) + bytes_of(p.cameras) +
+                               bytes_of(p.points) + bytes_of(p.observation_image) +
+                               bytes_of(p.observation_point) + bytes_of(p.observation_xy) +
+                               bytes_of(p.bal_angle_axis);
+  if (p.metadata == nullptr) return arrays;
+  const SceneMetadata& m = *p.metadata;
+  return arrays + bytes_of(m.camera_ids) + bytes_of(m.image_ids) + bytes_of(m.image_names) +
+         bytes_of(m.point_ids) + bytes_of(m.point_colours) + bytes_of(m.point_errors_px) +
+         bytes_of(m.observation_feature) + bytes_of(m.feature_begin) + bytes_of(m.feature_xy) +
+         bytes_of(m.stated_rotations);
 }
 
 }  // namespace sheaf

@@ -24,6 +24,7 @@ struct Statistics {
   double mean_track = 0;
   Range observations_per_image;
   Range focal_px;
+  double mean_error_px = 0;  ///< mean of the points' mean |r|, as COLMAP states it for a model
 };
 Statistics statistics_of(const Problem& problem);
 

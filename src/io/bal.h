@@ -28,7 +28,8 @@ Result<Problem> parse_bal(std::string_view bytes, const std::string& name,
                           std::size_t window_bytes = TokenReader::kWindowBytes);
 
 /// Every double in the shortest form that reads back to the same bits; a rotation as the file
-/// stated it when the pose still is the one that it converts to. Expects a valid problem.
+/// stated it when the pose still is the one that it converts to. Expects a valid problem of BAL
+/// cameras.
 Result<void> write_bal(const Problem& problem, OutputFile& out);
 
 }  // namespace sheaf

@@ -29,7 +29,8 @@ Result<void> write_bal(const Problem& problem, OutputFile& out) {
   for (std::size_t i = 0; i < problem.num_images() && !out.failed(); ++i) {
     for (double v : rotation_of(problem, i)) text.put(v, '\n');
     for (double v : problem.poses[i].translation) text.put(v, '\n');
-    for (double v : problem.cameras[problem.image_camera[i]].parameters) text.put(v, '\n');
+    const Camera& camera = problem.cameras[problem.image_camera[i]];
+    for (std::size_t k = 0; k < 3; ++k) text.put(camera.parameters[k], '\n');
   }
   for (std::size_t i = 0; i < problem.points.size() && !out.failed(); ++i)
     text.put(problem.points[i], '\n');

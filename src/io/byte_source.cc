@@ -112,7 +112,41 @@ Result<void> ByteSource::refill_block() {
   return {};
 }
 
+Result<std::string_view> ByteSource::head() {
+  constexpr std::size_t kHead = 64;
+  if (head_.empty()) {
+    std::string first(kHead, '\0');
+    const Result<std::size_t> n = read(first.data(), kHead);
+    if (!n.ok()) return n.error();
+    head_ = first.substr(0, n.value());
+  }
+  return std::string_view(head_);
+}
+
+Result<std::string> ByteSource::read_rest() {
+  constexpr std::size_t kPiece = 1 << 20;
+  limit_text((std::uint64_t{1} << 20) + 64 * raw_.size().value_or(std::uint64_t{1} << 30));
+  std::string text;
+  text.reserve(compression_ == Compression::none ? raw_.size().value_or(0) + 1 : 0);
+  for (std::size_t filled = 0;;) {
+    text.resize(filled + kPiece);
+    const Result<std::size_t> n = read(text.data() + filled, kPiece);
+    if (!n.ok()) return n.error();
+    filled += n.value();
+    text.resize(filled);
+    if (n.value() < kPiece) return text;
+  }
+}
+
 Result<std::size_t> ByteSource::read(char* to, std::size_t capacity) {
+  if (head_used_ < head_.size()) {
+    const std::size_t first = head_.copy(to, capacity, head_used_);
+    head_used_ += first;
+    if (first == capacity) return first;
+    const Result<std::size_t> rest = read(to + first, capacity - first);
+    if (!rest.ok()) return rest.error();
+    return first + rest.value();
+  }
   return decompressor_ ? read_compressed(to, capacity) : read_plain(to, capacity);
 }
 

@@ -59,6 +59,12 @@ class ByteSource {
   /// Fills up to `capacity` bytes; fewer only at the end of the text.
   Result<std::size_t> read(char* to, std::size_t capacity);
 
+  /// The first bytes of the text, up to 64; `read` begins with them all the same.
+  Result<std::string_view> head();
+
+  /// What is left of the text, as a whole; compressed text at most 64 times as large as the file.
+  Result<std::string> read_rest();
+
   /// Refuses to decompress to more than this (at first 1 MiB; plain text has no limit).
   void limit_text(std::uint64_t bytes) { limit_ = bytes; }
 
@@ -80,6 +86,8 @@ class ByteSource {
   std::unique_ptr<Decompressor> decompressor_;
   std::uint64_t members_ = 0;  ///< gzip members or bzip2 streams that ended
   bool in_member_ = false;
+  std::string head_;
+  std::size_t head_used_ = 0;
   std::uint64_t text_bytes_ = 0;
   std::uint64_t limit_ = std::uint64_t{1} << 20;
 };

@@ -6,21 +6,28 @@
 
 #include "io/bal.h"
 #include "io/bal_sink.h"
+#include "io/bundler.h"
 #include "io/byte_source.h"
+#include "io/colmap.h"
+#include "io/libmv.h"
+#include "io/nvm.h"
 #include "io/output_file.h"
 #include "io/ply.h"
 #include "io/sha256.h"
+#include "scene/camera_frame.h"
 #include "sheaf/io.h"
 
 namespace sheaf {
 namespace {
+
+namespace fs = std::filesystem;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 /// Hashes a file beside the parser, over a descriptor of its own; empty when it cannot be read.
-std::string hash_file(const std::filesystem::path& path) {
+std::string hash_file(const fs::path& path) {
   Result<RawBytes> raw = RawBytes::open(path);
   if (!raw.ok()) return {};
   Sha256 hash;
@@ -33,10 +40,29 @@ std::string hash_file(const std::filesystem::path& path) {
   }
 }
 
-Result<InputFile> read_from(RawBytes raw, const std::filesystem::path& path, bool hash) {
+/// By the first bytes; what nothing else claims is BAL, which has no mark.
+std::string sniff(std::string_view head) {
+  if (head.starts_with(kBundlerMark)) return "bundler";
+  if (head.starts_with(kNvmMark)) return "nvm";
+  if (is_libmv(head)) return "libmv";
+  return "bal";
+}
+
+Result<Problem> parse(ByteSource& source, InputFile& file) {
+  const Result<std::string_view> head = source.head();
+  if (!head.ok()) return head.error();
+  file.format = sniff(head.value());
+  if (file.format == "bal") return read_bal(source);
+  const Result<std::string> text = source.read_rest();
+  if (!text.ok()) return text.error();
+  if (file.format == "bundler") return parse_bundler(text.value(), source.name(), file.notes);
+  if (file.format == "nvm") return parse_nvm(text.value(), source.name(), file.notes);
+  return parse_libmv(text.value(), source.name(), file.notes);
+}
+
+Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
   const auto start = std::chrono::steady_clock::now();
   InputFile file;
-  file.format = "bal";
   // A pipe can be read only once: its bytes are hashed as they pass.
   Sha256 passing;
   std::jthread hashing;
@@ -45,7 +71,7 @@ Result<InputFile> read_from(RawBytes raw, const std::filesystem::path& path, boo
 
   Result<ByteSource> source = ByteSource::open(std::move(raw));
   if (!source.ok()) return source.error();
-  Result<Problem> problem = read_bal(source.value());
+  Result<Problem> problem = parse(source.value(), file);
   if (!problem.ok()) return problem.error();
   file.problem = std::move(problem).value();
   file.compression = to_string(source.value().compression());
@@ -59,83 +85,155 @@ Result<InputFile> read_from(RawBytes raw, const std::filesystem::path& path, boo
   return file;
 }
 
+Result<InputFile> read_folder(const fs::path& path, bool hash) {
+  const auto start = std::chrono::steady_clock::now();
+  const Result<ColmapFiles> files = load_colmap(path);
+  if (!files.ok()) return files.error();
+  Result<Problem> problem = parse_colmap(files.value());
+  if (!problem.ok()) return problem.error();
+  InputFile file;
+  file.problem = std::move(problem).value();
+  file.format = files.value().text ? "colmap-text" : "colmap";
+  file.compression = to_string(Compression::none);
+  file.bytes = files.value().bytes;
+  file.read_s = seconds_since(start);
+  if (!hash) return file;
+  Sha256 of_all;
+  for (const std::string* part :
+       {&files.value().cameras, &files.value().images, &files.value().points, &files.value().rigs,
+        &files.value().frames})
+    of_all.update(part->data(), part->size());
+  file.sha256 = of_all.hex_digest();
+  return file;
+}
+
 /// The name without its compression, which is taken off.
-std::filesystem::path strip_compression(std::filesystem::path path, Compression& compression) {
+fs::path strip_compression(fs::path path, Compression& compression) {
   compression = path.extension() == ".gz"    ? Compression::gzip
                 : path.extension() == ".bz2" ? Compression::bzip2
                                              : Compression::none;
   return compression == Compression::none ? path : path.replace_extension();
 }
 
-Error out_of_memory(const std::filesystem::path& path) {
+Error out_of_memory(const fs::path& path) {
   return Error(ErrorCode::memory_limit, path.string() + ": not enough memory for this problem");
 }
 
+Error refused(const fs::path& path, const Error& error) {
+  return error.code() == ErrorCode::usage
+             ? Error(ErrorCode::usage, path.string() + ": " + error.what())
+             : error;
+}
+
+Result<void> write_folder(const Problem& problem, const fs::path& path, bool text) {
+  const Result<ColmapFiles> files = format_colmap(problem, text);
+  if (!files.ok()) return refused(path, files.error());
+  return write_colmap(files.value(), path);
+}
+
 /// BAL needs one of each; a file that could not be read back is not written.
-Result<void> check_bal(const Problem& problem, const std::filesystem::path& path) {
-  if (problem.num_images() > 0 && problem.num_points() > 0 && problem.num_observations() > 0)
-    return {};
-  return Error(ErrorCode::usage, path.string() +
-                                     ": a BAL file needs at least one camera, one point and one "
-                                     "observation");
+Result<void> write_bal_file(const Problem& given, const fs::path& path) {
+  if (given.num_images() == 0 || given.num_points() == 0 || given.num_observations() == 0)
+    return Error(ErrorCode::usage, path.string() +
+                                       ": a BAL file needs at least one camera, one point and one "
+                                       "observation");
+  Problem turned;
+  const Result<const Problem*> problem = with_bal_cameras(given, turned);
+  if (!problem.ok()) return refused(path, problem.error());
+  Result<OutputFile> out = create_output(path);
+  if (!out.ok()) return out.error();
+  return write_bal(*problem.value(), out.value());
+}
+
+Result<void> write_text(const Result<std::string>& text, const fs::path& path) {
+  if (!text.ok()) return refused(path, text.error());
+  Result<OutputFile> out = create_output(path);
+  if (!out.ok()) return out.error();
+  out.value().write(text.value());
+  return out.value().commit();
+}
+
+Result<void> write_ply_file(const Problem& problem, const fs::path& path) {
+  Result<OutputFile> out = create_output(path);
+  if (!out.ok()) return out.error();
+  return write_ply(problem, out.value());
 }
 
 }  // namespace
 
-Result<InputFile> read_file(const std::filesystem::path& path, const ReadOptions& options) {
-  Result<RawBytes> raw = RawBytes::open(path);
-  if (!raw.ok()) return raw.error();
+Result<InputFile> read_file(const fs::path& path, const ReadOptions& options) {
   try {
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored)) return read_folder(path, options.hash);
+    Result<RawBytes> raw = RawBytes::open(path);
+    if (!raw.ok()) return raw.error();
     return read_from(std::move(raw).value(), path, options.hash);
   } catch (const std::bad_alloc&) {
     return out_of_memory(path);
   }
 }
 
-Result<Problem> read(const std::filesystem::path& path) {
+Result<Problem> read(const fs::path& path) {
   Result<InputFile> file = read_file(path);
   if (!file.ok()) return file.error();
   return std::move(file.value().problem);
 }
 
-Result<void> write(const Problem& problem, const std::filesystem::path& path) {
-  if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+std::string write_format(const Problem& problem, const fs::path& path) {
   Compression compression;
-  const bool ply = strip_compression(path, compression).extension() == ".ply";
-  if (!ply)
-    if (Result<void> fit = check_bal(problem, path); !fit.ok()) return fit;
+  const fs::path extension = strip_compression(path, compression).extension();
+  if (extension == ".ply") return "ply";
+  if (extension == ".out") return "bundler";
+  if (extension == ".nvm") return "nvm";
+  const std::string read_as =
+      problem.metadata && problem.metadata->source ? problem.metadata->source->format : "";
+  const bool from_colmap = read_as.starts_with("colmap");
+  std::error_code ignored;
+  const bool folder = !path.empty() && (!path.has_filename() || fs::is_directory(path, ignored));
+  if (folder || (from_colmap && path.extension().empty())) return from_colmap ? read_as : "colmap";
+  return "bal";
+}
+
+Result<void> write(const Problem& problem, const fs::path& path, const WriteOptions& options) {
+  if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+  const std::string format = options.format.empty() ? write_format(problem, path) : options.format;
   try {
-    Result<OutputFile> out = OutputFile::create(path, compression);
-    if (!out.ok()) return out.error();
-    return ply ? write_ply(problem, out.value()) : write_bal(problem, out.value());
+    if (format == "colmap" || format == "colmap-text")
+      return write_folder(problem, path, format == "colmap-text");
+    if (format == "bal") return write_bal_file(problem, path);
+    if (format == "bundler") return write_text(format_bundler(problem), path);
+    if (format == "nvm") return write_text(format_nvm(problem), path);
+    if (format == "ply") return write_ply_file(problem, path);
   } catch (const std::bad_alloc&) {
     return out_of_memory(path);
   }
+  return Error(ErrorCode::usage,
+               "Sheaf writes bal, colmap, colmap-text, bundler, nvm and ply, not '" + format + "'");
 }
 
-Result<OutputFile> create_output(const std::filesystem::path& path) {
+Result<OutputFile> create_output(const fs::path& path) {
   Compression compression;
   strip_compression(path, compression);
   return OutputFile::create(path, compression);
 }
 
-Result<void> check_writable(const std::filesystem::path& path) {
+Result<void> check_writable(const fs::path& path, bool model) {
   // Opening a pipe would wait for its reader, and closing it would end what that reads.
   std::error_code ignored;
-  if (std::filesystem::is_fifo(path, ignored)) return {};
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
+  if (fs::is_fifo(path, ignored)) return {};
+  fs::path probe = path;
+  if (model && fs::is_directory(path, ignored)) probe = path / "cameras";
+  if (model && !path.empty() && !path.has_filename()) probe = path.parent_path();
+  Result<OutputFile> out = OutputFile::create(probe, Compression::none);
   if (!out.ok()) return out.error();
   return {};
 }
 
-Result<void> write_ply(const Problem& before, const Problem& after,
-                       const std::filesystem::path& path) {
+Result<void> write_ply(const Problem& before, const Problem& after, const fs::path& path) {
   for (const Problem* problem : {&before, &after})
     if (Result<void> valid = validate(*problem); !valid.ok()) return valid;
-  Compression compression;
-  strip_compression(path, compression);
   try {
-    Result<OutputFile> out = OutputFile::create(path, compression);
+    Result<OutputFile> out = create_output(path);
     if (!out.ok()) return out.error();
     return write_ply(before, after, out.value());
   } catch (const std::bad_alloc&) {

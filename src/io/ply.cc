@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "geometry/camera_model.h"
 #include "geometry/rotation.h"
 
 namespace sheaf {
@@ -125,23 +126,41 @@ double frustum_depth(const Problem& problem, const std::vector<Vector3<double>>&
   return depth > 0 && std::isfinite(depth) ? depth : 1;
 }
 
-/// Half width and half height of each image in pixels, as far as its observations reach; BAL does
-/// not state image sizes.
+/// Half width and half height of each image in pixels: as the lens states them, or as far as its
+/// observations reach from the principal point.
 std::vector<std::array<double, 2>> half_sizes(const Problem& problem) {
   std::vector<std::array<double, 2>> half(problem.num_images(), {0, 0});
-  for (std::size_t i = 0; i < problem.num_observations(); ++i)
+  for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    const std::uint32_t image = problem.observation_image[i];
+    const Camera& camera = problem.cameras[problem.image_camera[image]];
+    const ParameterRoles roles = roles_of(camera.model);
     for (std::size_t k = 0; k < 2; ++k) {
-      double& h = half[problem.observation_image[i]][k];
-      h = std::max(h, std::abs(problem.observation_xy[2 * i + k]));
+      const int c = k == 0 ? roles.cx : roles.cy;
+      const double middle = c < 0 ? 0 : camera.parameters[static_cast<std::size_t>(c)];
+      half[image][k] =
+          std::max(half[image][k], std::abs(problem.observation_xy[2 * i + k] - middle));
     }
+  }
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const Camera& camera = problem.cameras[problem.image_camera[j]];
+    if (camera.width_px > 0 && camera.height_px > 0)
+      half[j] = {static_cast<double>(camera.width_px) / 2,
+                 static_cast<double>(camera.height_px) / 2};
+  }
   return half;
+}
+
+/// BAL's cameras look along -z with y up, all others along +z with y down.
+double forward(const Problem& problem, std::size_t image) {
+  return problem.cameras[problem.image_camera[image]].model == CameraModel::bal ? -1 : 1;
 }
 
 /// From the mean of the cameras' upward (y) axes: heights show more than any axis of the file.
 std::vector<double> heights(const Problem& problem) {
   Vector3<double> up{};
-  for (const Pose& pose : problem.poses) {
-    const Vector3<double> y = world_from_cam_direction(pose, {0, 1, 0});
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const Vector3<double> y =
+        world_from_cam_direction(problem.poses[j], {0, -forward(problem, j), 0});
     for (std::size_t k = 0; k < 3; ++k) up[k] += y[k];
   }
   std::vector<double> height(problem.num_points());
@@ -172,12 +191,21 @@ std::vector<Vector3<double>> centres_of(const Problem& problem) {
   return centres;
 }
 
+/// In the scene's own colours where it has them, else by height; or all grey.
 void put_points(const Problem& problem, bool grey, BinaryBuffer& out) {
-  const std::vector<double> height = grey ? std::vector<double>() : heights(problem);
+  const auto* own = !grey && problem.metadata && !problem.metadata->point_colours.empty()
+                        ? &problem.metadata->point_colours
+                        : nullptr;
+  const std::vector<double> height =
+      grey || own != nullptr ? std::vector<double>() : heights(problem);
   const double low = quantile(height, 0.05), high = quantile(height, 0.95);
   for (std::size_t i = 0; i < problem.num_points(); ++i) {
     out.put(point_at(problem, i));
-    out.put(grey ? kGreyPoint : ramp((height[i] - low) / (high - low)));
+    if (own != nullptr) {
+      out.put((*own)[i]);
+    } else {
+      out.put(grey ? kGreyPoint : ramp((height[i] - low) / (high - low)));
+    }
   }
 }
 
@@ -195,7 +223,8 @@ void put_frusta(const Problem& problem, double depth, const Colour& colour, Bina
     out.put(centre);
     out.put(colour);
     for (const auto& [sx, sy] : {std::array{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) {
-      Vector3<double> corner = world_from_cam_direction(problem.poses[i], {sx * x, sy * y, -depth});
+      Vector3<double> corner =
+          world_from_cam_direction(problem.poses[i], {sx * x, sy * y, forward(problem, i) * depth});
       for (std::size_t k = 0; k < 3; ++k) corner[k] += centre[k];
       out.put(corner);
       out.put(colour);

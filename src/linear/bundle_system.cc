@@ -96,7 +96,8 @@ void BundleSystem::fill_state(const Problem& problem) {
   for (const Pose& pose : problem.poses) poses_.push_back({pose.rotation, pose.translation});
   image_camera_ = problem.image_camera;
   lenses_.reserve(problem.cameras.size());
-  for (const Camera& camera : problem.cameras) lenses_.push_back(camera.parameters);
+  for (const Camera& camera : problem.cameras)
+    lenses_.push_back({camera.parameters[0], camera.parameters[1], camera.parameters[2]});
   trial_poses_ = poses_;
   trial_lenses_ = lenses_;
   cameras_.allocate(kCameraRecord * problem.num_images());
@@ -345,7 +346,8 @@ void BundleSystem::store(Problem& problem) const {
     problem.poses[i].rotation = poses_[i].rotation;
     problem.poses[i].translation = poses_[i].translation;
   }
-  for (std::size_t i = 0; i < lenses_.size(); ++i) problem.cameras[i].parameters = lenses_[i];
+  for (std::size_t i = 0; i < lenses_.size(); ++i)
+    std::copy(lenses_[i].begin(), lenses_[i].end(), problem.cameras[i].parameters.begin());
   threads_.for_ranges(batches_.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
     for (; g < end; ++g)
       for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l) {

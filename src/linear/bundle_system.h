@@ -40,6 +40,8 @@ class BundleSystem : public System {
   /// The batches must outlive it. Throws std::bad_alloc.
   BundleSystem(const Problem& problem, const Batches& batches, Columns columns,
                const PointRules& rules, const Plan& plan, const Kernels& kernels, Threads& threads);
+  BundleSystem(const Problem& problem, Batches&& batches, Columns columns, const PointRules& rules,
+               const Plan& plan, const Kernels& kernels, Threads& threads) = delete;
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;

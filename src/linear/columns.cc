@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "linear/columns.h"
 
+#include <array>
+
 namespace sheaf {
 
 Columns number_columns(const Problem& problem, const Fixed& fixed) {
@@ -9,7 +11,10 @@ Columns number_columns(const Problem& problem, const Fixed& fixed) {
   std::vector<char> lens_held(problem.cameras.size(), false);
   for (std::uint32_t i : fixed.pose_ids) pose_held[i] = true;
   for (std::uint32_t i : fixed.camera_ids) lens_held[i] = true;
-  const bool parameter_held[3] = {fixed.f, fixed.k1, fixed.k2};
+  std::vector<std::array<bool, 3>> parameter_held(problem.cameras.size(),
+                                                  {fixed.f, fixed.k1, fixed.k2});
+  for (std::uint32_t i : fixed.k1_ids) parameter_held[i][1] = true;
+  for (std::uint32_t i : fixed.k2_ids) parameter_held[i][2] = true;
 
   Columns out;
   out.of_image.assign(9 * problem.num_images(), Columns::kFixed);
@@ -23,7 +28,7 @@ Columns number_columns(const Problem& problem, const Fixed& fixed) {
     std::int32_t* parameters = &lens[3 * std::size_t(camera)];
     if (!lens_numbered[camera] && !lens_held[camera])
       for (int k = 0; k < 3; ++k)
-        if (!parameter_held[k]) parameters[k] = out.count++;
+        if (!parameter_held[camera][k]) parameters[k] = out.count++;
     for (int k = 0; k < 3; ++k) {
       columns[6 + k] = parameters[k];
       out.lens_shared = out.lens_shared || (lens_numbered[camera] && parameters[k] >= 0);

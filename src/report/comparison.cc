@@ -49,6 +49,34 @@ double best_cost(const std::vector<SolverRun>& runs) {
   return best;
 }
 
+std::string what_moved(const Problem& before, const Problem& after, const Fixed& fixed) {
+  const auto same = [](double a, double b) { return std::fabs(a - b) <= 1e-9 * std::fabs(a); };
+  const auto listed = [](const std::vector<std::uint32_t>& ids, std::size_t id) {
+    return std::find(ids.begin(), ids.end(), id) != ids.end();
+  };
+  if (fixed.points &&
+      !std::equal(before.points.begin(), before.points.end(), after.points.begin(), same))
+    return "points";
+  for (std::size_t i = 0; i < before.num_images(); ++i) {
+    const Pose &a = before.poses[i], &b = after.poses[i];
+    const double size = std::hypot(a.translation[0], a.translation[1], a.translation[2]);
+    double cosine = 0, shift = 0;
+    for (int j = 0; j < 4; ++j) cosine += a.rotation[j] * b.rotation[j];
+    for (int j = 0; j < 3; ++j)
+      shift = std::max(shift, std::fabs(a.translation[j] - b.translation[j]));
+    const bool stays = 1 - std::fabs(cosine) <= 1e-14 && shift <= 1e-9 * size;
+    if (!stays && (fixed.poses || listed(fixed.pose_ids, i))) return "poses";
+    const auto &own = before.cameras[before.image_camera[i]].parameters,
+               &other = after.cameras[after.image_camera[i]].parameters;
+    const bool whole = listed(fixed.camera_ids, before.image_camera[i]);
+    const bool held[3] = {fixed.f, fixed.k1, fixed.k2};
+    const char* const names[3] = {"f", "k1", "k2"};
+    for (int j = 0; j < 3; ++j)
+      if ((held[j] || whole) && !same(own[j], other[j])) return names[j];
+  }
+  return "";
+}
+
 std::vector<std::size_t> median_runs(const std::vector<SolverRun>& runs) {
   std::vector<std::size_t> out;
   for (std::size_t first = 0; first < runs.size(); ++first) {

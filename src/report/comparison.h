@@ -53,6 +53,10 @@ std::optional<double> time_to(const CostTrace& trace, double cost);
 /// The least independent cost of those that ran; infinite when none did.
 double best_cost(const std::vector<SolverRun>& runs);
 
+/// "points", "poses", "f", "k1" or "k2": the first of what is to be held that is not where it was,
+/// to 1e-9 of its size (a peer may write a rotation in other words); "" when all is.
+std::string what_moved(const Problem& before, const Problem& after, const Fixed& fixed);
+
 /// For each (solver, config), in order of appearance, the run of median total time; where none of
 /// its runs has a result, the first. Indices into runs.
 std::vector<std::size_t> median_runs(const std::vector<SolverRun>& runs);

@@ -4,9 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 #include <string>
+#include <unordered_map>
+#include <utility>
 
 #include "geometry/rotation.h"
+#include "scene/camera_frame.h"
 
 namespace sheaf {
 namespace {
@@ -34,6 +39,10 @@ std::vector<Vector3<double>> points_of(const Problem& problem) {
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     out.push_back({problem.points[3 * i], problem.points[3 * i + 1], problem.points[3 * i + 2]});
   return out;
+}
+
+bool looks_along_minus_z(const Problem& problem, std::size_t image) {
+  return problem.cameras[problem.image_camera[image]].model == CameraModel::bal;
 }
 
 // Below this certainty noise in the places turns the whole scene.
@@ -81,8 +90,60 @@ ErrorStatistics statistics_of_errors(std::vector<double> values) {
           std::sqrt(squares / static_cast<double>(n)), values.back()};
 }
 
-Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference,
-                               AlignBy align_by) {
+namespace {
+
+/// For each entry of the reference its place in the estimate, by a name that both state; as they
+/// come where one of them states none. Nothing where the estimate lacks one.
+template <class Name>
+std::optional<std::vector<std::size_t>> places_of(const std::vector<Name>& reference,
+                                                  const std::vector<Name>& estimate,
+                                                  std::size_t count) {
+  std::vector<std::size_t> places(count);
+  std::iota(places.begin(), places.end(), 0);
+  if (reference.size() != count || estimate.size() != count || reference == estimate) return places;
+  std::unordered_map<Name, std::size_t> place;
+  for (std::size_t i = 0; i < count; ++i) place[estimate[i]] = i;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto found = place.find(reference[i]);
+    if (found == place.end()) return {};
+    places[i] = found->second;
+  }
+  return places;
+}
+
+/// Poses, lenses and points in the reference's order.
+Result<Problem> in_order_of(const Problem& reference, const Problem& estimate) {
+  const auto images = places_of(reference.metadata->image_names, estimate.metadata->image_names,
+                                reference.num_images());
+  const auto points = places_of(reference.metadata->point_ids, estimate.metadata->point_ids,
+                                reference.num_points());
+  if (!images || !points)
+    return Error(ErrorCode::usage, std::string("the estimate has no ") +
+                                       (images ? "point of an id" : "image of a name") +
+                                       " that the reference has");
+  Problem ordered;
+  ordered.cameras = estimate.cameras;
+  for (const std::size_t j : *images)
+    ordered.add_image(estimate.poses[j], estimate.image_camera[j]);
+  for (const std::size_t p : *points)
+    ordered.add_point(estimate.points[3 * p], estimate.points[3 * p + 1],
+                      estimate.points[3 * p + 2]);
+  return ordered;
+}
+
+}  // namespace
+
+Result<ErrorLists> list_errors(const Problem& given, const Problem& reference, AlignBy align_by) {
+  Problem ordered;
+  const bool named = given.metadata && reference.metadata &&
+                     given.num_images() == reference.num_images() &&
+                     given.num_points() == reference.num_points();
+  if (named) {
+    Result<Problem> in_order = in_order_of(reference, given);
+    if (!in_order.ok()) return in_order.error();
+    ordered = std::move(in_order).value();
+  }
+  const Problem& estimate = named ? ordered : given;
   if (estimate.num_images() != reference.num_images() ||
       estimate.num_points() != reference.num_points())
     return Error(ErrorCode::usage, "the estimate has " + std::to_string(estimate.num_images()) +
@@ -96,8 +157,11 @@ Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference
   const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
   for (std::size_t j = 0; j < estimate.num_images(); ++j) {
     const Pose& want = reference.poses[j];
+    Pose have = estimate.poses[j];
+    if (looks_along_minus_z(estimate, j) != looks_along_minus_z(reference, j))
+      turn_round(have, false);
     const Quaternion<double> q =
-        multiply(Quaternion<double>(estimate.poses[j].rotation), conjugate(similarity.rotation));
+        multiply(Quaternion<double>(have.rotation), conjugate(similarity.rotation));
     const Vector3<double> phi = angle_axis_from_quaternion(multiply(q, conjugate(want.rotation)));
     out.rotation_rad.push_back(distance(phi, {}));
     const Vector3<double> c = similarity(centers[j]);
@@ -105,7 +169,7 @@ Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference
     Vector3<double> t = multiply(matrix_from_quaternion(q), c);
     for (double& x : t) x = -x;
     // Unaligned, t is as it stands: through the centre it would lose digits.
-    if (!out.alignment.aligned) t = estimate.poses[j].translation;
+    if (!out.alignment.aligned) t = have.translation;
     out.translation.push_back(distance(t, want.translation));
   }
   const auto points = points_of(estimate), reference_points = points_of(reference);

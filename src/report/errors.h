@@ -42,7 +42,9 @@ struct ErrorLists {
   std::vector<double> point;
 };
 
-/// Errors: ErrorCode::usage when the counts differ.
+/// Images and points are told by their names and ids where both problems state them, and then lists
+/// are in the reference's order; else by their order. Errors: ErrorCode::usage when counts or names
+/// differ.
 Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference, AlignBy align);
 
 /// How far an estimate is from a reference with the same images and points.

@@ -159,7 +159,8 @@ Problem make_truth(const Tracks& tracks, const Lakeside& lakeside) {
   for (const Lakeside::Station& station : lakeside.stations()) {
     // As a reader of the file would convert it, so that the writer recognises it.
     truth.add_image({quaternion_from_angle_axis(station.angle_axis), station.translation},
-                    {CameraModel::bal, station.intrinsics});
+                    Camera{CameraModel::bal,
+                           {station.intrinsics[0], station.intrinsics[1], station.intrinsics[2]}});
     truth.bal_angle_axis.insert(truth.bal_angle_axis.end(), station.angle_axis.begin(),
                                 station.angle_axis.end());
   }

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/camera_model.h"
 #include "platform/random.h"
+#include "scene/subset.h"
 #include "scene/view.h"
 #include "sheaf/scene.h"
 
@@ -98,14 +100,21 @@ void disturb_images(Problem& problem, const NoiseOptions& o) {
   }
 }
 
+// f (fx and fy alike), k1 and k2; what a model does not have draws its number all the same.
 void disturb_lenses(Problem& problem, const NoiseOptions& o) {
   Random random(o.seed, kLenses);
   for (Camera& camera : problem.cameras) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double draw = random.normal();
-      double& parameter = camera.parameters[k];
+    const ParameterRoles roles = roles_of(camera.model);
+    const auto disturb = [&](int which, std::size_t k, double draw) {
+      if (which < 0) return;
+      double& parameter = camera.parameters[static_cast<std::size_t>(which)];
       parameter += (o.intrinsics[k] + o.intrinsics_relative[k] * std::fabs(parameter)) * draw;
-    }
+    };
+    const double f = random.normal();
+    disturb(roles.fx, 0, f);
+    if (roles.fy != roles.fx) disturb(roles.fy, 0, f);
+    disturb(roles.k1, 1, random.normal());
+    disturb(roles.k2, 2, random.normal());
   }
 }
 
@@ -141,65 +150,42 @@ void move_outlier(Problem& problem, std::uint64_t i, const NoiseOptions& o) {
   problem.observation_xy[2 * i + 1] += o.outlier_px * direction.sine;
 }
 
-// Distance in front of the image plane; BAL cameras look along -z.
+// Distance in front of the image plane; BAL cameras look along -z, all others along +z.
 double depth_of(const Problem& problem, const std::vector<Matrix3<double>>& rotations,
                 std::uint64_t i) {
   const std::uint32_t j = problem.observation_image[i];
   const double* X = &problem.points[3 * std::size_t{problem.observation_point[i]}];
   const Matrix3<double>& R = rotations[j];
-  return -(R[6] * X[0] + R[7] * X[1] + R[8] * X[2] + problem.poses[j].translation[2]);
+  const double z = R[6] * X[0] + R[7] * X[1] + R[8] * X[2] + problem.poses[j].translation[2];
+  return problem.cameras[problem.image_camera[j]].model == CameraModel::bal ? -z : z;
 }
 
-// Keeps the observations with a number other than kGone, under the new numbers of their points.
-constexpr std::uint32_t kGone = UINT32_MAX;
-
-void keep(Problem& problem, const std::vector<bool>& kept,
-          const std::vector<std::uint32_t>& numbers, std::vector<std::uint64_t>& outliers) {
+// The outliers among the observations that are left, by their new numbers.
+std::vector<std::uint64_t> outliers_left(const std::vector<std::uint64_t>& outliers,
+                                         const std::vector<bool>& kept) {
+  std::vector<std::uint64_t> left;
   std::uint64_t to = 0;
   auto outlier = outliers.begin();
-  std::vector<std::uint64_t> left;
-  for (std::uint64_t i = 0; i < problem.num_observations(); ++i) {
-    const bool moved = outlier != outliers.end() && *outlier == i;
+  for (std::uint64_t i = 0; i < kept.size() && outlier != outliers.end(); ++i) {
+    const bool moved = *outlier == i;
     if (moved) ++outlier;
-    const std::uint32_t point = numbers[problem.observation_point[i]];
-    if (!kept[i] || point == kGone) continue;
-    if (moved) left.push_back(to);
-    problem.observation_image[to] = problem.observation_image[i];
-    problem.observation_point[to] = point;
-    problem.observation_xy[2 * to] = problem.observation_xy[2 * i];
-    problem.observation_xy[2 * to + 1] = problem.observation_xy[2 * i + 1];
-    ++to;
+    if (moved && kept[i]) left.push_back(to);
+    to += kept[i];
   }
-  outliers = std::move(left);
-  problem.observation_image.resize(to);
-  problem.observation_point.resize(to);
-  problem.observation_xy.resize(2 * to);
+  return left;
 }
 
 void drop_near(Problem& problem, double least_depth, NoiseRecord& record) {
   std::vector<Matrix3<double>> rotations;
   for (std::size_t j = 0; j < problem.num_images(); ++j)
     rotations.push_back(portable_matrix(portable_rotation(problem, j)));
-  const std::uint64_t observations = problem.num_observations();
+  const std::uint64_t observations = problem.num_observations(), points = problem.num_points();
   std::vector<bool> kept(observations);
-  std::vector<std::uint32_t> numbers(problem.num_points(), 0);  // first counts, then new numbers
-  for (std::uint64_t i = 0; i < observations; ++i) {
+  for (std::uint64_t i = 0; i < observations; ++i)
     kept[i] = depth_of(problem, rotations, i) >= least_depth;
-    if (kept[i]) ++numbers[problem.observation_point[i]];
-  }
-  std::uint32_t next = 0;
-  for (std::size_t p = 0; p < numbers.size(); ++p) {
-    if (numbers[p] < 2) {
-      numbers[p] = kGone;
-      continue;
-    }
-    for (std::size_t k = 0; k < 3; ++k)
-      problem.points[3 * std::size_t{next} + k] = problem.points[3 * p + k];
-    numbers[p] = next++;
-  }
-  record.dropped_points = numbers.size() - next;
-  problem.points.resize(3 * std::size_t{next});
-  keep(problem, kept, numbers, record.outliers);
+  keep_observations(problem, kept, 2);
+  record.outliers = outliers_left(record.outliers, kept);
+  record.dropped_points = points - problem.num_points();
   record.dropped_observations = observations - problem.num_observations();
 }
 

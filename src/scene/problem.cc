@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sheaf/problem.h"
 
+#include <bit>
 #include <cmath>
 #include <string>
 
-#include "geometry/bal_camera.h"
+#include "geometry/camera_model.h"
 #include "geometry/rotation.h"
 
 namespace sheaf {
@@ -96,6 +97,31 @@ Result<void> validate_observations(const Problem& p) {
   return {};
 }
 
+Result<void> validate_metadata(const Problem& p) {
+  if (p.metadata == nullptr) return {};
+  const SceneMetadata& m = *p.metadata;
+  const auto fits = [](const auto& list, std::size_t count) {
+    return list.empty() || list.size() == count;
+  };
+  const bool images = fits(m.image_ids, p.num_images()) && fits(m.image_names, p.num_images()) &&
+                      fits(m.feature_begin, p.num_images() + 1) &&
+                      (fits(m.stated_rotations, 4 * p.num_images()) ||
+                       fits(m.stated_rotations, 9 * p.num_images()));
+  const bool points = fits(m.point_ids, p.num_points()) && fits(m.point_colours, p.num_points()) &&
+                      fits(m.point_errors_px, p.num_points());
+  const bool observations =
+      fits(m.observation_feature, p.num_observations()) &&
+      (m.feature_begin.empty() || (m.observation_feature.size() == p.num_observations() &&
+                                   m.feature_xy.size() == 2 * m.feature_begin.back()));
+  if (images && points && observations && fits(m.camera_ids, p.cameras.size())) return {};
+  return invalid(std::string("the metadata describe another number of ") +
+                 (!images         ? "images"
+                  : !points       ? "points"
+                  : !observations ? "observations"
+                                  : "lenses") +
+                 " than the problem has: set them anew, or to null");
+}
+
 /// Neumaier's compensated sum.
 struct CompensatedSum {
   double sum = 0, correction = 0;
@@ -110,7 +136,8 @@ struct CompensatedSum {
 }  // namespace
 
 Result<void> validate(const Problem& problem) {
-  for (const auto& check : {validate_sizes, validate_images, validate_observations})
+  for (const auto& check :
+       {validate_sizes, validate_images, validate_observations, validate_metadata})
     if (Result<void> result = check(problem); !result.ok()) return result;
   return {};
 }
@@ -127,14 +154,13 @@ Evaluation evaluate(const Problem& problem) {
     const std::uint32_t image = problem.observation_image[i];
     const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
     const auto& t = problem.poses[image].translation;
-    const auto& k = problem.cameras[problem.image_camera[image]].parameters;
     Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
     for (int j = 0; j < 3; ++j) P[j] += t[j];
-    const auto u = project(BalCamera<double>{k[0], k[1], k[2]}, P);
-    const double dx = u[0] - problem.observation_xy[2 * i];
-    const double dy = u[1] - problem.observation_xy[2 * i + 1];
+    const Projected u = project(problem.cameras[problem.image_camera[image]], P);
+    const double dx = u.pixel[0] - problem.observation_xy[2 * i];
+    const double dy = u.pixel[1] - problem.observation_xy[2 * i + 1];
     const double square = dx * dx + dy * dy;
-    if (P[2] > 0) out.behind.push_back(i);
+    if (!u.before) out.behind.push_back(i);
     if (!std::isfinite(square)) {
       out.not_finite.push_back(i);
       continue;
@@ -145,6 +171,26 @@ Evaluation evaluate(const Problem& problem) {
   out.cost = sum.value() / 2;
   out.rms_px = finite > 0 ? std::sqrt(sum.value() / static_cast<double>(finite)) : 0;
   return out;
+}
+
+std::uint64_t state_hash(const Problem& problem) {
+  std::uint64_t hash = 0x9e3779b97f4a7c15u;
+  const auto mix = [&hash](std::uint64_t word) {
+    hash = (std::rotl(hash, 23) ^ word) * 0xd6e8feb86659fd93u;
+    hash ^= hash >> 32;
+  };
+  const auto add = [&mix](const auto& numbers) {
+    for (const double x : numbers) mix(std::bit_cast<std::uint64_t>(x));
+  };
+  for (const Pose& pose : problem.poses) add(pose.rotation), add(pose.translation);
+  for (const Camera& camera : problem.cameras)
+    mix(static_cast<std::uint64_t>(camera.model)), add(camera.parameters);
+  add(problem.points);
+  add(problem.observation_xy);
+  for (const std::uint32_t i : problem.image_camera) mix(i);
+  for (const std::uint32_t i : problem.observation_image) mix(i);
+  for (const std::uint32_t i : problem.observation_point) mix(i);
+  return hash;
 }
 
 }  // namespace sheaf

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,17 +15,58 @@
 
 namespace sheaf {
 
+inline bool same_bits(const Quaternion<double>& a, const Quaternion<double>& b) {
+  for (std::size_t k = 0; k < 4; ++k)
+    if (std::bit_cast<std::uint64_t>(a[k]) != std::bit_cast<std::uint64_t>(b[k])) return false;
+  return true;
+}
+
+/// A quaternion as a file stated it: itself where its length is 1 to rounding, else normalised.
+/// Not of unit length for one that has no direction, or a length that is absurd.
+inline Quaternion<double> rotation_from_stated(const std::array<double, 4>& q) {
+  const double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return std::abs(norm2 - 1) < 4e-15 ? q : normalized(q);
+}
+
+/// The same of a row-major matrix that is a rotation as nearly as its digits allow; the quaternion
+/// is taken from the largest of its four squares.
+inline Quaternion<double> rotation_from_stated(const std::array<double, 9>& m) {
+  const double x2 = 1 + m[0] - m[4] - m[8], y2 = 1 - m[0] + m[4] - m[8];
+  const double z2 = 1 - m[0] - m[4] + m[8], w2 = 1 + m[0] + m[4] + m[8];
+  const double a = m[7] - m[5], b = m[2] - m[6], c = m[3] - m[1];
+  const double d = m[1] + m[3], e = m[2] + m[6], f = m[5] + m[7];
+  if (w2 >= x2 && w2 >= y2 && w2 >= z2) return normalized(Quaternion<double>{w2, a, b, c});
+  if (x2 >= y2 && x2 >= z2) return normalized(Quaternion<double>{a, x2, d, e});
+  if (y2 >= z2) return normalized(Quaternion<double>{b, d, y2, f});
+  return normalized(Quaternion<double>{c, e, f, z2});
+}
+
+/// What the metadata have an image's rotation as (4 or 9 numbers), where the pose's quaternion is
+/// still the one that this converts to, bit for bit; else null.
+inline const double* stated_numbers(const Problem& problem, std::size_t image, std::size_t count) {
+  if (problem.metadata == nullptr) return nullptr;
+  const std::vector<double>& all = problem.metadata->stated_rotations;
+  if (all.size() != count * problem.num_images() || all.empty()) return nullptr;
+  const double* stated = &all[count * image];
+  Quaternion<double> converted;
+  if (count == 9) {
+    std::array<double, 9> m;
+    std::copy_n(stated, 9, m.begin());
+    converted = rotation_from_stated(m);
+  } else {
+    converted =
+        rotation_from_stated(Quaternion<double>{stated[0], stated[1], stated[2], stated[3]});
+  }
+  return same_bits(converted, problem.poses[image].rotation) ? stated : nullptr;
+}
+
 /// The rotation of an image as its file stated it (angle-axis, radians), where the pose's
 /// quaternion is still the one that this converts to, bit for bit.
 inline std::optional<Vector3<double>> stated_rotation(const Problem& problem, std::size_t image) {
   if (problem.bal_angle_axis.empty()) return {};
   const double* a = &problem.bal_angle_axis[3 * image];
   const Vector3<double> stated{a[0], a[1], a[2]};
-  const Quaternion<double> converted = quaternion_from_angle_axis(stated);
-  for (std::size_t k = 0; k < 4; ++k)
-    if (std::bit_cast<std::uint64_t>(converted[k]) !=
-        std::bit_cast<std::uint64_t>(problem.poses[image].rotation[k]))
-      return {};
+  if (!same_bits(quaternion_from_angle_axis(stated), problem.poses[image].rotation)) return {};
   return stated;
 }
 

@@ -180,7 +180,7 @@ class ProblemSink : public SceneSink {
              const std::array<double, 3>& intrinsics) override {
     // As a reader of the file would convert it, so that the writer recognises it.
     problem.add_image({quaternion_from_angle_axis(angle_axis), translation},
-                      {CameraModel::bal, intrinsics});
+                      Camera{CameraModel::bal, {intrinsics[0], intrinsics[1], intrinsics[2]}});
     problem.bal_angle_axis.insert(problem.bal_angle_axis.end(), angle_axis.begin(),
                                   angle_axis.end());
   }

@@ -7,6 +7,7 @@
 
 #include "linear/chunks.h"
 #include "linear/forecast.h"
+#include "linear/image_system.h"
 
 namespace sheaf {
 namespace {
@@ -53,7 +54,28 @@ std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 999999) / 1000000) + " MB";
 }
 
+Error over_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more) {
+  return Error(ErrorCode::memory_limit, "the solver would need " + megabytes(needed) +
+                                            ", over the limit of " + megabytes(limit) +
+                                            "; nothing was allocated" + more);
+}
+
 }  // namespace
+
+Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
+                                 const SolveOptions& options, const MemoryHeld& held) {
+  WorkCounts counts;
+  counts.images = columns.num_images();
+  counts.images_couple = false;
+  const auto free_columns = static_cast<std::uint64_t>(columns.count);
+  constexpr std::uint64_t kCode = 1000000;  // of the solver, mapped when it runs
+  const std::uint64_t needed =
+      held.resident_bytes + kCode + ImageSystem::bytes(counts.images, free_columns, batches);
+  const Choice choice{plan_solver(counts), std::max(held.peak_bytes, needed)};
+  if (options.memory_limit_bytes > 0 && choice.forecast_bytes > options.memory_limit_bytes)
+    return over_limit(choice.forecast_bytes, options.memory_limit_bytes, "");
+  return choice;
+}
 
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
                              const MemoryHeld& held) {
@@ -83,13 +105,10 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
     choice.forecast_bytes = lean;
     return choice;
   }
-  return Error(ErrorCode::memory_limit,
-               "the solver would need " + megabytes(choice.forecast_bytes) +
-                   ", over the limit of " + megabytes(options.memory_limit_bytes) +
-                   "; nothing was allocated" +
-                   (lean < choice.forecast_bytes
+  return over_limit(choice.forecast_bytes, options.memory_limit_bytes,
+                    lean < choice.forecast_bytes
                         ? " (the leanest solver, iterative-implicit, needs " + megabytes(lean) + ")"
-                        : ""));
+                        : "");
 }
 
 }  // namespace sheaf

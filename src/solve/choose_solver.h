@@ -23,4 +23,8 @@ struct Choice {
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
                              const MemoryHeld& held);
 
+/// Points held and no lens shared: each image by itself. `batches`: count_image_batches.
+Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
+                                 const SolveOptions& options, const MemoryHeld& held);
+
 }  // namespace sheaf

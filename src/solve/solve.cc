@@ -8,11 +8,13 @@
 #include <utility>
 
 #include "linear/bundle_system.h"
+#include "linear/image_system.h"
 #include "linear/kernel_table.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "residual/lent_observations.h"
 #include "scene/behind.h"
+#include "solve/bal_view.h"
 #include "solve/choose_solver.h"
 #include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
@@ -50,15 +52,17 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 
 Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+  if (Result<void> known = BalView::check(problem); !known.ok()) return known;
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   for (std::uint32_t i : options.fixed.pose_ids)
     if (i >= problem.num_images())
       return usage("fixed pose " + std::to_string(i) + " is not one of the " +
                    std::to_string(problem.num_images()) + " images");
-  for (std::uint32_t i : options.fixed.camera_ids)
-    if (i >= problem.cameras.size())
-      return usage("fixed camera " + std::to_string(i) + " is not one of the " +
-                   std::to_string(problem.cameras.size()) + " cameras");
+  for (const auto* ids : {&options.fixed.camera_ids, &options.fixed.k1_ids, &options.fixed.k2_ids})
+    for (std::uint32_t i : *ids)
+      if (i >= problem.cameras.size())
+        return usage("fixed camera " + std::to_string(i) + " is not one of the " +
+                     std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
   if (options.inner_iterations < 0) return usage("inner_iterations is negative");
@@ -111,6 +115,29 @@ void tell(const Choice& choice, const SolveOptions& options, const Kernels& kern
   if (options.on_plan) options.on_plan(summary);
 }
 
+/// Points held, no lens shared: images by themselves.
+Result<void> refine_images(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+                           const std::vector<std::uint8_t>& skip, Columns columns, Threads& threads,
+                           const Stopwatch& clock, Summary& summary) {
+  const Result<Choice> choice = choose_for_images(columns, count_image_batches(problem), options,
+                                                  {resident_bytes(), peak_resident_bytes()});
+  if (!choice.ok()) return choice.error();
+  tell(choice.value(), options, kernels, threads, summary);
+  ImageSystem system(problem, arrange_by_image(problem, skip), std::move(columns),
+                     options.cheirality != Cheirality::formula, image_kernels(kernels.name),
+                     threads);
+  if (system.count_behind() > 0) summary.behind_camera_before = behind_camera(problem, threads);
+  summary.setup_s = clock.seconds();
+  SolveOptions resolved = options;
+  if (resolved.initial_damping == 0)
+    resolved.initial_damping = default_damping(problem.num_images());
+  minimize_in_rounds(system, resolved, clock, summary);
+  system.store(problem);
+  summary.solve_s = clock.seconds() - summary.setup_s;
+  if (system.count_behind() > 0) summary.behind_camera_after = behind_camera(problem, threads);
+  return {};
+}
+
 /// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
 Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
                     const Stopwatch& clock, Summary& summary) {
@@ -122,6 +149,12 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
     for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
   }
   Columns columns = number_columns(problem, options.fixed);
+  const bool only_images = options.fixed.points && !columns.lens_shared &&
+                           options.trust_region == TrustRegion::lm &&
+                           options.solver == CameraSolverKind::automatic;
+  if (only_images)
+    return refine_images(problem, options, kernels, skip, std::move(columns), threads, clock,
+                         summary);
   const Batches batches = arrange(problem, skip, threads);
   Clusters clusters;
   WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
@@ -175,7 +208,9 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   try {
-    if (Result<void> done = refine(problem, options, *kernels.value(), clock, summary); !done.ok())
+    SolveOptions resolved = options;
+    const BalView view(problem, resolved.fixed);
+    if (Result<void> done = refine(problem, resolved, *kernels.value(), clock, summary); !done.ok())
       return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");

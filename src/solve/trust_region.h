@@ -8,7 +8,7 @@
 #include "linear/system.h"
 #include "platform/clock.h"
 #include "sheaf/options.h"
-#include "sheaf/summary.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 

@@ -141,6 +141,31 @@ TEST_F(CompareCommand, WhatGoesWrongIsARowAndNotTheEnd) {
   EXPECT_EQ(document["best_cost"], run_of(document, "sheaf")["final_cost_independent"]);
 }
 
+TEST_F(CompareCommand, HoldsWhatIsFixedAndShowsTheSteps) {
+  add_honest_peer("still", start_cost_);
+  // The truth as its answer: the points are not where they were.
+  add_peer("mover", "cp '" + (folder_ / "truth.txt") +
+                        "' \"$out\"\necho '{\"setup_s\": 0, \"total_s\": 1, \"trace\": [[0, 1]], "
+                        "\"cpu_percent\": 1, \"peak_bytes\": 1, \"final_cost\": 1}'");
+  const Outcome outcome =
+      run({"compare", "in.txt", "--solvers", "sheaf,sheaf:dense,still,mover", "--peers", "peers",
+           "--fix", "points,intrinsics", "--tolerance", "1e-5", "--steps", "--json", "c.json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json document = json_of(folder_ / "c.json");
+  EXPECT_EQ(document["options"]["fix"], "points,intrinsics");
+  EXPECT_EQ(document["options"]["tolerance"], 1e-5);
+  EXPECT_EQ(run_of(document, "mover")["failed"], "it moved points, which it was to hold");
+  EXPECT_TRUE(run_of(document, "still")["failed"].is_null());
+  const json& apart = document["runs"][0];
+  const json& together = document["runs"][1];
+  EXPECT_NEAR(apart["final_cost_independent"].get<double>(),
+              together["final_cost_independent"].get<double>(), 1e-6 * start_cost_);
+  EXPECT_LT(apart["trace"].size(), 12u) << "a loose tolerance ends early";
+  EXPECT_NE(outcome.out.find("rejected\n"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("Seconds of each step"), std::string::npos);
+  EXPECT_EQ(run({"compare", "in.txt", "--fix", "nonsense"}).exit_code, 2);
+}
+
 TEST_F(CompareCommand, NamesWhatIsMissingAndHowToInstallIt) {
   const Outcome outcome = run({"compare", "in.txt", "--solvers", "sheaf,ceres,g2o,gtsam,magic",
                                "--peers", "peers", "--json", "c.json"});
@@ -181,14 +206,15 @@ TEST_F(CompareCommand, HandsPeersPlainTextAndTheSameLimits) {
   ASSERT_EQ(run({"convert", "in.txt", "in.txt.bz2"}).exit_code, 0);
   add_peer("echo",
            "cp \"$1\" \"$out\"\nhead -c 2 \"$1\" >&2\necho \" $* $OMP_NUM_THREADS\" >&2\nexit 9");
-  ASSERT_EQ(
-      run({"compare", "in.txt.bz2", "--solvers", "sheaf,echo:w", "--peers", "peers", "--threads",
-           "3", "--max-iterations", "7", "--time-limit", "11", "--json", "c.json"})
-          .exit_code,
-      0);
+  ASSERT_EQ(run({"compare", "in.txt.bz2", "--solvers", "sheaf,echo:w", "--peers", "peers",
+                 "--threads", "3", "--max-iterations", "7", "--time-limit", "11", "--tolerance",
+                 "1e-07", "--fix", "k2,pose=3", "--json", "c.json"})
+                .exit_code,
+            0);
   const std::string said = run_of(json_of(folder_ / "c.json"), "echo")["failed"];
   EXPECT_EQ(said.rfind("exit code 9: 16", 0), 0u) << said;
-  for (const char* words : {"--config w", "--threads 3", "--max-iterations 7", "--time-limit 11"})
+  for (const char* words : {"--config w", "--threads 3", "--max-iterations 7", "--time-limit 11",
+                            "--tolerance 1e-07", "--fix k2,pose=3"})
     EXPECT_NE(said.find(words), std::string::npos) << said;
   EXPECT_EQ(said.substr(said.size() - 2), " 3");
 }

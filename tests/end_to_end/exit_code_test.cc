@@ -55,11 +55,12 @@ TEST_P(UsageErrors, ExitWithTwoAndNameWhatIsAccepted) {
 INSTANTIATE_TEST_SUITE_P(
     Command, UsageErrors,
     testing::Values(
-        WrongUsage{
-            {}, {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"}},
-        WrongUsage{
-            {"refine"},
-            {"solve", "info", "convert", "perturb", "evaluate", "compare", "generate", "demo"}},
+        WrongUsage{{},
+                   {"solve", "info", "check", "convert", "perturb", "evaluate", "compare",
+                    "generate", "demo"}},
+        WrongUsage{{"refine"},
+                   {"solve", "info", "check", "convert", "perturb", "evaluate", "compare",
+                    "generate", "demo"}},
         WrongUsage{{"perturb", "tiny.txt"}, {"OUT"}},
         WrongUsage{{"perturb", "tiny.txt", "o.txt", "--outliers", "1.5"}, {"from 0 to 1"}},
         WrongUsage{{"perturb", "tiny.txt", "o.txt", "--point", "-1"}, {"from 0 up"}},

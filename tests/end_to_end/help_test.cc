@@ -35,6 +35,9 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
                     "--time-to", "--runs", "--plot"});
   if (verb == "info") options.insert("--pattern");
+  if (verb == "convert")
+    options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
+                    "--min-track"});
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
@@ -96,7 +99,7 @@ TEST_P(Help, ExampleRuns) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
-                         testing::Values("solve", "info", "convert", "perturb", "evaluate",
+                         testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
                                          "photometric", "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
@@ -104,7 +107,7 @@ TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "convert", "perturb", "evaluate", "compare",
+  for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "compare",
                            "photometric", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());

@@ -107,6 +107,13 @@ TEST_F(JsonTest, InfoHasTheDocumentedKeys) {
   EXPECT_TRUE(json_of(folder_ / "info.json")["pattern"].is_null());
 }
 
+TEST_F(JsonTest, CheckHasTheDocumentedKeys) {
+  write_text(folder_ / "lone.txt",
+             "1 2 3\n0 0 1 2\n0 1 3 4\n0 0 1 2\n0 0 0 0 0 0 500 0 0\n0 0 5\n0 0 -4\n");
+  ASSERT_EQ(run({"check", "lone.txt", "--json", "check.json"}).exit_code, 0);
+  expect_documented("check", {kShared, "check"});
+}
+
 TEST_F(JsonTest, ConvertHasTheDocumentedKeys) {
   ASSERT_EQ(run({"convert", "in.txt", "o.txt.gz", "--json", "convert.json"}).exit_code, 0);
   expect_documented("convert", {kShared, "convert"});

@@ -71,6 +71,17 @@ Dual<S, N> sin(const Dual<S, N>& a) {
   return combine<S, N>(std::sin(a.value), [&](int i) { return std::cos(a.value) * a.d[i]; });
 }
 template <class S, int N>
+Dual<S, N> tan(const Dual<S, N>& a) {
+  const S t = std::tan(a.value);
+  return combine<S, N>(t, [&](int i) { return (1 + t * t) * a.d[i]; });
+}
+template <class S, int N>
+Dual<S, N> atan2(const Dual<S, N>& y, const Dual<S, N>& x) {
+  const S square = x.value * x.value + y.value * y.value;
+  return combine<S, N>(std::atan2(y.value, x.value),
+                       [&](int i) { return (x.value * y.d[i] - y.value * x.d[i]) / square; });
+}
+template <class S, int N>
 Dual<S, N> cos(const Dual<S, N>& a) {
   return combine<S, N>(std::cos(a.value), [&](int i) { return -std::sin(a.value) * a.d[i]; });
 }

@@ -41,7 +41,10 @@ TEST(ReadFile, SaysWhyAFileCannotBeRead) {
   EXPECT_EQ(message("missing"),
             place + "missing: found: No such file or directory, expected a readable file");
   EXPECT_EQ(message("empty"), place + "empty: found an empty file, expected text");
-  EXPECT_EQ(message("folder"), place + "folder: found a directory, expected a file");
+  EXPECT_EQ(message("folder"),
+            place +
+                "folder: found a folder without cameras.bin or cameras.txt, expected a file or "
+                "the folder of a COLMAP model");
 }
 
 TEST(ReadFile, HashesOnlyWhenAsked) {
@@ -65,13 +68,20 @@ TEST(WriteFile, RefusesWhatCannotBeWrittenAndLeavesNothing) {
         }}) {
     EXPECT_NE(message_of(attempt(folder / "absent/out.txt")).find("No such file"),
               std::string::npos);
-    EXPECT_NE(message_of(attempt(folder / "folder")).find("is a directory"), std::string::npos);
     EXPECT_NE(message_of(attempt(folder / "file/out.txt")).find("Not a directory"),
               std::string::npos);
     EXPECT_NE(message_of(attempt("")).find("name is empty"), std::string::npos);
   }
   EXPECT_EQ(folder.files(), 2u);
   EXPECT_EQ(test::slurp(folder / "file"), "kept");
+  // A folder is for models.
+  const std::filesystem::path model = folder / "folder";
+  EXPECT_NE(message_of(check_writable(model)).find("is a directory"), std::string::npos);
+  EXPECT_NE(message_of(write(small_problem(), model, {.format = "bal"})).find("is a directory"),
+            std::string::npos);
+  EXPECT_TRUE(check_writable(model, true).ok());
+  EXPECT_TRUE(check_writable(folder / "new/", true).ok());
+  EXPECT_FALSE(check_writable(folder / "absent/new/", true).ok());
 }
 
 TEST(WriteFile, AFullDiskIsAnError) {

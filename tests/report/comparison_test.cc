@@ -63,5 +63,37 @@ TEST(Agrees, HoldsTheOwnCostAgainstTheIndependentOne) {
   EXPECT_FALSE(run.agrees());
 }
 
+TEST(WhatMoved, SeesWhatWasToBeHeldAndNothingElse) {
+  Problem before;
+  before.add_point(1, 2, 3);
+  for (double f : {500.0, 600.0}) before.add_image(Pose{}, Camera{CameraModel::bal, {f, 0.1, 0.2}});
+  Problem after = before;
+  const auto moved = [&](const Fixed& fixed) { return what_moved(before, after, fixed); };
+  Fixed all;
+  all.points = all.poses = all.f = all.k1 = all.k2 = true;
+  EXPECT_EQ(moved(all), "");
+  after.points[1] += 1e-6;
+  EXPECT_EQ(moved(all), "points");
+  EXPECT_EQ(moved({}), "");
+  after = before;
+  after.poses[1].rotation = {-1, 0, 0, 0};  // the same rotation
+  EXPECT_EQ(moved(all), "");
+  after.poses[1].rotation = {std::cos(1e-5), std::sin(1e-5), 0, 0};
+  EXPECT_EQ(moved(all), "poses");
+  Fixed one;
+  one.pose_ids = {0};
+  EXPECT_EQ(moved(one), "");
+  one.pose_ids = {1};
+  EXPECT_EQ(moved(one), "poses");
+  after = before;
+  after.cameras[1].parameters[2] += 1e-6;
+  EXPECT_EQ(moved(all), "k2");
+  Fixed lens;
+  lens.camera_ids = {1};
+  EXPECT_EQ(moved(lens), "k2");
+  lens.camera_ids = {0};
+  EXPECT_EQ(moved(lens), "");
+}
+
 }  // namespace
 }  // namespace sheaf

@@ -117,7 +117,8 @@ std::uint64_t hash_of(const Problem& problem) {
                      problem.observation_xy[2 * i], problem.observation_xy[2 * i + 1]);
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
     const double* a = &problem.bal_angle_axis[3 * j];
-    hash.image({a[0], a[1], a[2]}, problem.poses[j].translation, problem.cameras[j].parameters);
+    const auto& k = problem.cameras[j].parameters;
+    hash.image({a[0], a[1], a[2]}, problem.poses[j].translation, {k[0], k[1], k[2]});
   }
   for (std::size_t i = 0; i < problem.points.size(); i += 3)
     hash.point({problem.points[i], problem.points[i + 1], problem.points[i + 2]});

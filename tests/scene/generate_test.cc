@@ -46,7 +46,7 @@ std::uint64_t hash_of(const Problem& problem) {
   for (const Pose& pose : problem.poses)
     for (const double x : pose.translation) hash.add(x);
   for (const Camera& camera : problem.cameras)
-    for (const double x : camera.parameters) hash.add(x);
+    for (std::size_t k = 0; k < 3; ++k) hash.add(camera.parameters[k]);
   for (const double x : problem.points) hash.add(x);
   for (const double x : problem.observation_xy) hash.add(x);
   for (const std::uint32_t i : problem.observation_image) hash.add(std::uint64_t{i});

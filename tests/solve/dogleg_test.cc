@@ -80,12 +80,14 @@ struct Case {
 /// A system without inner iterations: the textbook has none.
 struct Engine {
   Threads threads{2};
+  Batches batches;
   BundleSystem system;
   double damping;
   ScaledLoss loss;
 
   Engine(const Problem& problem, const Case& c, const Kernels& kernels = *available_kernels()[0])
-      : system(problem, arrange(problem), number_columns(problem, c.fixed),
+      : batches(arrange(problem)),
+        system(problem, batches, number_columns(problem, c.fixed),
                PointRules{c.fixed.points, false, 0}, Plan{c.solver, "", false}, kernels, threads),
         damping(c.damping),
         loss(c.loss) {}

@@ -297,5 +297,60 @@ TEST(OverlongTrack, IsSolvedOrRefusedNeverMiscounted) {
     }
 }
 
+/// Images by themselves against the whole machinery with a camera matrix: the same steps.
+TEST(PointsHeld, TakeTheStepsOfTheFullSystem) {
+  Problem start = small_scene().start;
+  start.points = small_scene().truth.points;
+  Fixed lens = points_held(), some = points_held();
+  lens.f = lens.k1 = lens.k2 = true;
+  some.pose_ids = {2};
+  some.camera_ids = {4};
+  some.k2 = true;
+  for (const Fixed& fixed : {points_held(), lens, some})
+    for (const Loss& loss : {Loss(), Loss(Huber{1}), Loss(Cauchy{})}) {
+      SolveOptions options;
+      options.fixed = fixed;
+      options.loss = loss;
+      options.cheirality = Cheirality::reject;
+      Problem apart = start, together = start;
+      const Summary a = solve(apart, options);
+      options.solver = CameraSolverKind::dense;
+      const Summary b = solve(together, options);
+      EXPECT_EQ(a.solver, "blocks");
+      EXPECT_EQ(b.solver, "dense");
+      const std::size_t steps = std::min(a.iterations.size(), b.iterations.size());
+      EXPECT_GE(steps, 4u);
+      for (std::size_t i = 0; i + 1 < steps; ++i) {
+        EXPECT_NEAR(a.iterations[i].cost, b.iterations[i].cost, 1e-9 * b.iterations[i].cost);
+        EXPECT_NEAR(a.iterations[i].gain_ratio, b.iterations[i].gain_ratio, 1e-3) << i;
+      }
+      EXPECT_NEAR(a.final_sigma_px, b.final_sigma_px, 1e-9);
+      EXPECT_NEAR(a.final_plain_cost, b.final_plain_cost, 1e-9 * b.final_plain_cost);
+      EXPECT_EQ(apart.points, start.points);
+    }
+}
+
+TEST(PointsHeld, GiveTheSameBitsOnAnyThreads) {
+  SceneOptions scene;
+  scene.images = 40;
+  scene.points = 9000;
+  const Problem start = generate(scene).value().start;
+  Problem first;
+  for (int threads : {1, 2, 5}) {
+    SolveOptions options;
+    options.fixed = points_held();
+    options.threads = threads;
+    options.loss = Cauchy{};
+    Problem problem = start;
+    solve(problem, options);
+    if (threads == 1) first = problem;
+    for (std::size_t i = 0; i < start.num_images(); ++i) {
+      EXPECT_EQ(problem.poses[i].rotation, first.poses[i].rotation);
+      EXPECT_EQ(problem.poses[i].translation, first.poses[i].translation);
+      EXPECT_EQ(problem.cameras[i].parameters, first.cameras[i].parameters);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace sheaf

@@ -1,0 +1,75 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inspect/check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "json_document.h"
+#include "outputs.h"
+#include "sheaf/sheaf.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  std::string in;
+};
+
+// "images 3, 17, 18 ..."
+std::string places_text(const Finding& finding) {
+  constexpr std::size_t kShown = 8;
+  std::string out;
+  for (std::size_t k = 0; k < std::min(finding.first.size(), kShown); ++k)
+    out += fmt::format("{}{}", k == 0 ? " " : ", ", finding.first[k]);
+  if (out.empty()) return out;
+  return fmt::format("            {}{}{}\n", finding.of, out, finding.count > kShown ? " ..." : "");
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  const std::string& json = arguments.common.json;
+  check_outputs({{"--json", json}});
+  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const std::vector<Finding> findings = check(input.problem);
+  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
+  for (const Finding& finding : findings)
+    fmt::print("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
+               places_text(finding));
+  if (findings.empty()) fmt::print("nothing that looks wrong\n");
+  if (json.empty()) return 0;
+  Json list = Json::array();
+  for (const Finding& f : findings)
+    list.push_back({{"code", f.code},
+                    {"grave", f.grave},
+                    {"count", f.count},
+                    {"of", f.of},
+                    {"first", f.first},
+                    {"words", f.words}});
+  write_json({{"version", SHEAF_VERSION},
+              {"input", input_json(arguments.in, input)},
+              {"findings", list},
+              {"time", {{"read_s", input.read_s}, {"total_s", total.seconds()}}}},
+             json);
+  return 0;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb = *app.add_subcommand("check", "what is wrong with a problem, and what to do");
+  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
+  add_common_options(verb, arguments->common);
+  verb.footer("Example:\n  sheaf check problem.txt --json check.json");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

@@ -1,0 +1,70 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "geometry/camera_model.h"
+
+namespace sheaf {
+
+Projected project(const Camera& camera, const std::array<double, 3>& P) {
+  const double* k = camera.parameters.data();
+  if (camera.model == CameraModel::bal)
+    return {project(BalCamera<double>{k[0], k[1], k[2]}, P), BalLens::sees(k, P.data())};
+  return with_lens(camera.model, [&](auto lens) {
+    LensJacobian<double> J;
+    lens.project(k, P.data(), J);
+    return Projected{J.pixel, lens.sees(k, P.data())};
+  });
+}
+
+LensJacobian<double> project_with_jacobian(const Camera& camera, const std::array<double, 3>& P) {
+  LensJacobian<double> out{};
+  with_lens(camera.model,
+            [&](auto lens) { lens.project(camera.parameters.data(), P.data(), out); });
+  return out;
+}
+
+std::size_t parameter_count(CameraModel model) {
+  return with_lens(model, [](auto lens) { return decltype(lens)::kParameters.size(); });
+}
+
+std::vector<std::string_view> parameter_names(CameraModel model) {
+  return with_lens(model, [](auto lens) {
+    const auto& names = decltype(lens)::kParameters;
+    return std::vector<std::string_view>(names.begin(), names.end());
+  });
+}
+
+std::string_view to_string(CameraModel model) {
+  return with_lens(model, [](auto lens) { return decltype(lens)::kName; });
+}
+
+std::optional<CameraModel> camera_model_named(std::string_view name) {
+  for (std::size_t i = 0; i < kCameraModels; ++i)
+    if (to_string(static_cast<CameraModel>(i)) == name) return static_cast<CameraModel>(i);
+  return {};
+}
+
+int colmap_id(CameraModel model) {
+  return with_lens(model, [](auto lens) { return decltype(lens)::kColmapId; });
+}
+
+std::optional<CameraModel> camera_model_of_colmap(int id) {
+  for (std::size_t i = 0; i < kCameraModels; ++i)
+    if (id >= 0 && colmap_id(static_cast<CameraModel>(i)) == id) return static_cast<CameraModel>(i);
+  return {};
+}
+
+ParameterRoles roles_of(CameraModel model) {
+  ParameterRoles roles;
+  const std::vector<std::string_view> names = parameter_names(model);
+  for (int i = 0; i < static_cast<int>(names.size()); ++i) {
+    const std::string_view name = names[static_cast<std::size_t>(i)];
+    if (name == "fy") roles.fy = i;
+    if (name == "cx") roles.cx = i;
+    if (name == "cy") roles.cy = i;
+    if (name == "k1" || name == "k") roles.k1 = i;
+    if (name == "k2") roles.k2 = i;
+  }
+  return roles;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,127 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inspect/clean.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "geometry/rotation.h"
+#include "scene/point_errors.h"
+#include "scene/subset.h"
+
+namespace sheaf {
+namespace {
+
+constexpr std::size_t kMostRays = 64;
+
+std::vector<Vector3<double>> centres_of(const Problem& problem) {
+  std::vector<Vector3<double>> centres;
+  for (const Pose& pose : problem.poses) {
+    const auto& [w, x, y, z] = pose.rotation;
+    const auto& t = pose.translation;
+    centres.push_back(multiply(matrix_from_quaternion<double>({w, -x, -y, -z}),
+                               Vector3<double>{-t[0], -t[1], -t[2]}));
+  }
+  return centres;
+}
+
+/// Images that see each point, those of point i from begin[i] to begin[i + 1].
+struct Tracks {
+  std::vector<std::uint64_t> begin;
+  std::vector<std::uint32_t> images;
+};
+
+Tracks tracks_of(const Problem& problem, const std::vector<bool>& kept) {
+  Tracks tracks;
+  tracks.begin.assign(problem.num_points() + 1, 0);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    if (kept[i]) ++tracks.begin[problem.observation_point[i] + 1];
+  for (std::size_t p = 0; p < problem.num_points(); ++p) tracks.begin[p + 1] += tracks.begin[p];
+  tracks.images.resize(tracks.begin.back());
+  std::vector<std::uint64_t> next(tracks.begin.begin(), tracks.begin.end() - 1);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    if (kept[i]) tracks.images[next[problem.observation_point[i]]++] = problem.observation_image[i];
+  return tracks;
+}
+
+double angle_between(const Vector3<double>& a, const Vector3<double>& b) {
+  const Vector3<double> c = cross(a, b);
+  const double sine = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+  return std::atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+}
+
+}  // namespace
+
+std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<bool>& kept) {
+  const std::vector<Vector3<double>> centres = centres_of(problem);
+  const Tracks tracks = tracks_of(problem, kept);
+  std::vector<double> angles(problem.num_points(), 0);
+  std::vector<Vector3<double>> rays;
+  for (std::size_t p = 0; p < angles.size(); ++p) {
+    const std::uint64_t begin = tracks.begin[p], length = tracks.begin[p + 1] - begin;
+    const std::uint64_t step = (length + kMostRays - 1) / kMostRays;
+    rays.clear();
+    for (std::uint64_t k = 0; k < length; k += step) {
+      const Vector3<double>& c = centres[tracks.images[begin + k]];
+      rays.push_back({problem.points[3 * p] - c[0], problem.points[3 * p + 1] - c[1],
+                      problem.points[3 * p + 2] - c[2]});
+    }
+    for (std::size_t a = 0; a < rays.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        angles[p] = std::max(angles[p], angle_between(rays[a], rays[b]));
+    angles[p] *= 180 / std::numbers::pi;
+  }
+  return angles;
+}
+
+Repetitions repetitions_in(const Problem& problem) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
+  pairs.reserve(problem.num_observations());
+  for (std::size_t i = 0; i < problem.num_observations(); ++i)
+    pairs.emplace_back(
+        std::uint64_t{problem.observation_point[i]} << 32 | problem.observation_image[i], i);
+  std::sort(pairs.begin(), pairs.end());
+  Repetitions out;
+  for (std::size_t k = 1; k < pairs.size(); ++k) {
+    if (pairs[k].first != pairs[k - 1].first) continue;
+    const double* a = &problem.observation_xy[2 * pairs[k - 1].second];
+    const double* b = &problem.observation_xy[2 * pairs[k].second];
+    (a[0] == b[0] && a[1] == b[1] ? out.same_pixel : out.other_pixel).push_back(pairs[k].second);
+  }
+  std::sort(out.same_pixel.begin(), out.same_pixel.end());
+  std::sort(out.other_pixel.begin(), out.other_pixel.end());
+  return out;
+}
+
+CleanRecord clean(Problem& problem, const CleanOptions& options) {
+  CleanRecord record;
+  const std::size_t observations = problem.num_observations();
+  std::vector<bool> kept(observations, true);
+  if (options.max_error_px > 0) {
+    const std::vector<double> lengths = residual_lengths(problem);
+    for (std::size_t i = 0; i < observations; ++i)
+      if (!(lengths[i] <= options.max_error_px)) record.far_off.push_back(i);
+  }
+  if (options.behind) record.behind = evaluate(problem).behind;
+  if (options.repeated) record.repeated = repetitions_in(problem).same_pixel;
+  for (const auto* list : {&record.far_off, &record.behind, &record.repeated})
+    for (const std::uint64_t i : *list) kept[i] = false;
+  std::vector<bool> narrow(problem.num_points(), false);
+  if (options.min_angle_deg > 0) {
+    const std::vector<double> angles = ray_angles_deg(problem, kept);
+    for (std::size_t p = 0; p < angles.size(); ++p)
+      if (angles[p] < options.min_angle_deg) narrow[p] = true, record.narrow.push_back(p);
+  }
+  for (std::size_t i = 0; i < observations; ++i)
+    if (narrow[problem.observation_point[i]]) kept[i] = false;
+  const std::uint32_t least = std::max<std::uint32_t>(options.min_track, options.any() ? 1 : 0);
+  const std::vector<std::uint32_t> numbers = keep_observations(problem, kept, least);
+  for (std::size_t p = 0; p < numbers.size(); ++p)
+    if (numbers[p] == kGonePoint && !narrow[p]) record.short_tracks.push_back(p);
+  record.observations = observations - problem.num_observations();
+  return record;
+}
+
+}  // namespace sheaf

@@ -1,0 +1,160 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <numeric>
+
+#include "io/colmap_form.h"
+#include "io/output_file.h"
+#include "scene/camera_frame.h"
+#include "scene/point_errors.h"
+#include "scene/stated_rotation.h"
+
+namespace sheaf {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint8_t kGrey = 128;
+
+template <class Id>
+std::vector<Id> ids_or_numbers(const std::vector<Id>& ids, std::size_t count) {
+  if (!ids.empty()) return ids;
+  std::vector<Id> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), Id{1});
+  return numbers;
+}
+
+bool writable_in_text(const std::string& name) {
+  const auto bad = [](char c) { return c == '\n' || c == '\r'; };
+  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
+  return std::none_of(name.begin(), name.end(), bad) &&
+         (name.empty() || (!blank(name.front()) && !blank(name.back())));
+}
+
+ColmapFiles text_files(const ColmapForm& form, const SourceFiles* source) {
+  ColmapFiles files;
+  files.text = true;
+  if (source == nullptr) {
+    files.cameras = cameras_text(form, "", nullptr);
+    files.images = images_text(form, "", nullptr);
+    files.points = points_text(form, "", nullptr);
+    return files;
+  }
+  ColmapFiles were;
+  were.text = true;
+  were.cameras = source->cameras;
+  were.images = source->images;
+  were.points = source->points;
+  const Result<Problem> before = parse_colmap(were);
+  if (!before.ok()) return text_files(form, nullptr);
+  const ColmapForm before_form = colmap_form(before.value());
+  files.cameras = cameras_text(form, source->cameras, &before_form);
+  files.images = images_text(form, source->images, &before_form);
+  files.points = points_text(form, source->points, &before_form);
+  return files;
+}
+
+/// Kept where the form is the same and no pose of a rig would be wrong.
+void add_rigs(const Problem& problem, const SourceFiles& source, bool unchanged,
+              ColmapFiles& files) {
+  if (source.frames.empty() || source.format != (files.text ? "colmap-text" : "colmap")) return;
+  ColmapFiles rigs;
+  rigs.text = files.text;
+  rigs.rigs = source.rigs;
+  rigs.frames = source.frames;
+  const auto frames = unchanged ? std::optional(source.frames) : frames_with_poses(rigs, problem);
+  if (!frames) return;
+  files.rigs = source.rigs;
+  files.frames = *frames;
+}
+
+}  // namespace
+
+std::array<double, 4> ColmapForm::rotation(std::size_t image) const {
+  if (const double* q = stated_numbers(*problem, image, 4)) return {q[0], q[1], q[2], q[3]};
+  return problem->poses[image].rotation;
+}
+
+ColmapForm colmap_form(const Problem& problem) {
+  static const SceneMetadata kNone;
+  const SceneMetadata& metadata = problem.metadata ? *problem.metadata : kNone;
+  ColmapForm form;
+  form.problem = &problem;
+  form.unchanged = problem.metadata && state_hash(problem) == metadata.state_hash;
+  form.camera_ids = ids_or_numbers(metadata.camera_ids, problem.cameras.size());
+  form.image_ids = ids_or_numbers(metadata.image_ids, problem.num_images());
+  form.point_ids = ids_or_numbers(metadata.point_ids, problem.num_points());
+  form.names = metadata.image_names;
+  if (form.names.empty())
+    for (const std::uint32_t id : form.image_ids)
+      form.names.push_back("image-" + std::to_string(id));
+  form.colours = metadata.point_colours;
+  if (form.colours.empty()) form.colours.assign(problem.num_points(), {kGrey, kGrey, kGrey});
+  form.features = feature_table(problem, form.point_ids);
+  form.errors_px = form.unchanged && !metadata.point_errors_px.empty() ? metadata.point_errors_px
+                                                                       : mean_point_errors(problem);
+  return form;
+}
+
+Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
+  Problem turned;
+  const Problem* problem = without_bal_cameras(given, turned);
+  const ColmapForm form = colmap_form(*problem);
+  for (const std::string& name : form.names)
+    if (text && !writable_in_text(name))
+      return Error(ErrorCode::usage, "the image name '" + name +
+                                         "' begins or ends with a blank or holds a line's end, "
+                                         "which COLMAP's text form cannot state");
+  const SourceFiles* source = given.metadata ? given.metadata->source.get() : nullptr;
+  ColmapFiles files;
+  if (text) {
+    files = text_files(form, source && source->format == "colmap-text" ? source : nullptr);
+  } else {
+    files.cameras = cameras_binary(form);
+    files.images = images_binary(form);
+    files.points = points_binary(form);
+  }
+  if (source) add_rigs(*problem, *source, form.unchanged, files);
+  return files;
+}
+
+Result<void> write_colmap(const ColmapFiles& given, const fs::path& folder) {
+  ColmapFiles files = given;
+  files.folder = (folder / "").string();
+  const auto refuse = [&](const std::string& why) {
+    return Error(ErrorCode::unwritable_output, folder.string() + ": cannot be written: " + why);
+  };
+  std::error_code error;
+  const bool there = fs::is_directory(folder, error);
+  const std::vector<std::pair<std::string, const std::string*>> parts = {
+      {files.name("cameras"), &files.cameras},
+      {files.name("images"), &files.images},
+      {files.name("points3D"), &files.points},
+      {files.name("rigs"), &files.rigs},
+      {files.name("frames"), &files.frames}};
+  ColmapFiles other;
+  other.text = !files.text;
+  other.folder = files.folder;
+  for (const char* stem : {"cameras", "images", "points3D", "rigs", "frames"})
+    if (there && fs::exists(other.name(stem), error))
+      return refuse("it holds " + other.name(stem) +
+                    ", which would be mixed up with what is written");
+  for (const auto& [name, bytes] : parts)
+    if (there && bytes->empty() && fs::exists(name, error))
+      return refuse("it holds " + name + " of a model with rigs, which this one has not");
+  if (!there && !fs::create_directory(folder, error))
+    return refuse(error ? error.message() : "it is there and no folder");
+  std::vector<OutputFile> outputs;
+  for (const auto& [name, bytes] : parts) {
+    if (bytes->empty()) continue;
+    Result<OutputFile> out = OutputFile::create(name, Compression::none);
+    if (!out.ok()) return out.error();
+    outputs.push_back(std::move(out).value());
+    outputs.back().write(*bytes);
+  }
+  for (OutputFile& out : outputs)
+    if (Result<void> done = out.commit(); !done.ok()) return done;
+  return {};
+}
+
+}  // namespace sheaf

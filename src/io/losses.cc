@@ -1,0 +1,87 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "io/colmap_parts.h"
+#include "io/source_files.h"
+#include "scene/camera_frame.h"
+#include "sheaf/io.h"
+
+namespace sheaf {
+namespace {
+
+using Sentences = std::vector<std::string>;
+
+bool shares_lenses(const Problem& problem) { return problem.cameras.size() < problem.num_images(); }
+
+bool states_sizes(const Problem& problem) {
+  return std::any_of(problem.cameras.begin(), problem.cameras.end(),
+                     [](const Camera& c) { return c.width_px > 0; });
+}
+
+/// Features that nothing observes.
+std::size_t idle_features(const Problem& problem) {
+  if (!problem.metadata || problem.metadata->feature_begin.empty()) return 0;
+  return problem.metadata->feature_begin.back() - problem.num_observations();
+}
+
+void add_lens_losses(const Problem& problem, Sentences& out) {
+  if (shares_lenses(problem))
+    out.push_back("lenses that images share (" + std::to_string(problem.cameras.size()) + " for " +
+                  std::to_string(problem.num_images()) + " images) are written for each image");
+  if (states_sizes(problem)) out.push_back("the size of the images is not written");
+  if (!has_only_bal_cameras(problem))
+    out.push_back("measurements count from the principal point, which is not written itself");
+}
+
+void add_rig_losses(const std::string& format, const Problem& problem, Sentences& out) {
+  const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
+  if (source == nullptr || source->frames.empty()) return;
+  if (source->format != format) {
+    out.push_back(format.starts_with("colmap")
+                      ? "rigs and frames are kept only in the form they were read in (" +
+                            std::string(source->format == "colmap" ? "binary" : "text") + ")"
+                      : "rigs and frames are not written");
+    return;
+  }
+  ColmapFiles files;
+  files.text = format == "colmap-text";
+  files.rigs = source->rigs;
+  files.frames = source->frames;
+  if (state_hash(problem) != problem.metadata->state_hash && !frames_with_poses(files, problem))
+    out.push_back(
+        "rigs and frames are not written: images of one frame moved by themselves, so that no pose "
+        "of their rig is right for all");
+}
+
+}  // namespace
+
+Sentences lost_in(const std::string& format, const Problem& problem) {
+  Sentences out;
+  const SceneMetadata* m = problem.metadata.get();
+  const bool colmap = format.starts_with("colmap");
+  add_rig_losses(format, problem, out);
+  if (colmap && m && m->source && m->source->listed_images > problem.num_images())
+    out.push_back("images that were never placed are not written");
+  if (colmap) return out;
+  if (format == "ply") {
+    out.push_back("only points, colours and the cameras' places are written, in single precision");
+    return out;
+  }
+  add_lens_losses(problem, out);
+  const std::size_t idle = idle_features(problem);
+  if (idle > 0)
+    out.push_back(std::to_string(idle) + " features that observe no point are not written");
+  const bool names = m && !m->image_names.empty() && format != "nvm";
+  const bool ids = m && (!m->point_ids.empty() || !m->camera_ids.empty());
+  const bool colours = m && !m->point_colours.empty() && format == "bal";
+  const auto list = [&](bool there, const char* what) {
+    if (there) out.push_back(std::string(what) + " not written");
+  };
+  list(names, "image names are");
+  list(ids, "ids are");
+  list(colours, "colours are");
+  return out;
+}
+
+}  // namespace sheaf

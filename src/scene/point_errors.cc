@@ -1,0 +1,45 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/point_errors.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include "geometry/camera_model.h"
+#include "geometry/rotation.h"
+
+namespace sheaf {
+
+std::vector<double> residual_lengths(const Problem& problem) {
+  std::vector<Matrix3<double>> rotations;
+  rotations.reserve(problem.num_images());
+  for (const Pose& pose : problem.poses) rotations.push_back(matrix_from_quaternion(pose.rotation));
+  std::vector<double> lengths(problem.num_observations());
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const std::uint32_t image = problem.observation_image[i];
+    const double* X = &problem.points[3 * std::size_t{problem.observation_point[i]}];
+    Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
+    for (std::size_t k = 0; k < 3; ++k) P[k] += problem.poses[image].translation[k];
+    const auto u = project(problem.cameras[problem.image_camera[image]], P).pixel;
+    lengths[i] =
+        std::hypot(u[0] - problem.observation_xy[2 * i], u[1] - problem.observation_xy[2 * i + 1]);
+  }
+  return lengths;
+}
+
+std::vector<double> mean_point_errors(const Problem& problem) {
+  const std::vector<double> lengths = residual_lengths(problem);
+  std::vector<double> errors(problem.num_points(), 0);
+  std::vector<std::uint32_t> counts(problem.num_points(), 0);
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    errors[problem.observation_point[i]] += lengths[i];
+    ++counts[problem.observation_point[i]];
+  }
+  for (std::size_t p = 0; p < errors.size(); ++p) {
+    if (counts[p] > 0) errors[p] /= counts[p];
+    if (!std::isfinite(errors[p])) errors[p] = -1;
+  }
+  return errors;
+}
+
+}  // namespace sheaf

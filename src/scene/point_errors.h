@@ -1,0 +1,18 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// |r| of each observation, px; may be infinite or NaN.
+std::vector<double> residual_lengths(const Problem& problem);
+
+/// Mean |r| of each point's observations, px, as COLMAP states it for points; 0 for a point without
+/// observations, and -1 (not known) where it is not finite.
+std::vector<double> mean_point_errors(const Problem& problem);
+
+}  // namespace sheaf
