@@ -34,7 +34,7 @@ class ImageSystem : public System {
   Trial trial() override;
   void accept() override;
   double residual_scale(double quantile) override;
-  void store(Problem& problem) const override;
+  void store(Problem& problem) const;
 
   /// Observations behind their camera at the held state.
   std::uint64_t count_behind() const;

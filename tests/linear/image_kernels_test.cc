@@ -47,7 +47,8 @@ std::vector<double> camera_records(const Problem& problem) {
     const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
     out.insert(out.end(), R.begin(), R.end());
     for (double x : problem.poses[i].translation) out.push_back(x);
-    for (double x : problem.cameras[problem.image_camera[i]].parameters) out.push_back(x);
+    const auto& lens = problem.cameras[problem.image_camera[i]].parameters;
+    out.insert(out.end(), lens.begin(), lens.begin() + 3);
     out.push_back(0);
   }
   return out;
