@@ -11,6 +11,7 @@
 #include "geometry/rotation.h"
 #include "io/colmap_parts.h"
 #include "io/line_cursor.h"
+#include "io/point_text.h"
 #include "io/source_files.h"
 #include "scene/camera_frame.h"
 #include "scene/stated_rotation.h"
@@ -22,30 +23,10 @@ namespace {
 constexpr std::uint64_t kLeastImage = 30, kLeastPoint = 14, kLeastView = 8;
 constexpr std::uint32_t kUnplaced = std::numeric_limits<std::uint32_t>::max();
 
-struct Reader {
-  LineCursor in;
-  std::uint64_t size;
-  Problem problem;
-  SceneMetadata metadata;
+struct Reader : PointText {
   std::vector<std::uint32_t> image_of_listed;
 
-  template <class Numbers>
-  std::optional<Error> reals(Numbers& numbers, const std::string& what) {
-    for (double& x : numbers) {
-      in.seek_field();
-      if (!in.read_real(x)) return in.refuse("a finite number, " + what);
-    }
-    return {};
-  }
-  template <class Integer>
-  std::optional<Error> integer(Integer& value, const std::string& what) {
-    in.seek_field();
-    if (!in.read_integer(value)) return in.refuse(what);
-    return {};
-  }
-
   std::optional<Error> image(std::uint32_t i);
-  std::optional<Error> point(std::uint64_t i);
   std::optional<Error> view();
 };
 
@@ -94,23 +75,6 @@ std::optional<Error> Reader::view() {
   return {};
 }
 
-std::optional<Error> Reader::point(std::uint64_t i) {
-  const std::string of = " of point " + std::to_string(i);
-  std::array<double, 3> X{};
-  if (auto e = reals(X, "a coordinate" + of)) return e;
-  problem.add_point(X[0], X[1], X[2]);
-  std::array<std::uint8_t, 3> colour{};
-  for (std::uint8_t& c : colour)
-    if (auto e = integer(c, "a colour, 0 to 255," + of)) return e;
-  metadata.point_colours.push_back(colour);
-  std::uint64_t views = 0;
-  if (auto e = integer(views, "the number of views" + of)) return e;
-  if (views > size / kLeastView) return in.refuse("a number of views that the file can hold," + of);
-  for (std::uint64_t k = 0; k < views; ++k)
-    if (auto e = view()) return e;
-  return {};
-}
-
 class Text {
  public:
   template <class Number>
@@ -144,7 +108,7 @@ void put_image(const Problem& problem, std::size_t j, Text& out) {
 
 Result<Problem> parse_bundler(std::string_view text, const std::string& name,
                               std::vector<std::string>& notes) {
-  Reader reader{LineCursor(text, name), text.size(), {}, {}, {}};
+  Reader reader{{LineCursor(text, name), text.size()}, {}};
   LineCursor& in = reader.in;
   in.next_line();
   if (in.rest() != "# Bundle file v0.3")
@@ -161,7 +125,7 @@ Result<Problem> parse_bundler(std::string_view text, const std::string& name,
   for (std::uint32_t i = 0; i < images; ++i)
     if (auto e = reader.image(i)) return *e;
   for (std::uint64_t i = 0; i < points; ++i)
-    if (auto e = reader.point(i)) return *e;
+    if (auto e = reader.point(i, kLeastView, [&] { return reader.view(); })) return *e;
   if (in.seek_field()) {
     std::string_view word;
     in.read_word(word);

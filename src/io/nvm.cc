@@ -11,6 +11,7 @@
 #include "geometry/rotation.h"
 #include "io/colmap_form.h"
 #include "io/line_cursor.h"
+#include "io/point_text.h"
 #include "io/source_files.h"
 #include "scene/camera_frame.h"
 #include "scene/stated_rotation.h"
@@ -21,32 +22,12 @@ namespace {
 /// Least text of a record, each field one digit.
 constexpr std::uint64_t kLeastImage = 22, kLeastPoint = 14, kLeastView = 8;
 
-struct Reader {
-  LineCursor in;
-  std::uint64_t size;
+struct Reader : PointText {
   bool matrices;  ///< R9T
-  Problem problem;
-  SceneMetadata metadata;
   SourceFiles source;
-
-  template <class Numbers>
-  std::optional<Error> reals(Numbers& numbers, const std::string& what) {
-    for (double& x : numbers) {
-      in.seek_field();
-      if (!in.read_real(x)) return in.refuse("a finite number, " + what);
-    }
-    return {};
-  }
-  template <class Integer>
-  std::optional<Error> integer(Integer& value, const std::string& what) {
-    in.seek_field();
-    if (!in.read_integer(value)) return in.refuse(what);
-    return {};
-  }
 
   std::optional<Error> place(const std::string& of, Pose& pose);
   std::optional<Error> image(std::uint64_t i);
-  std::optional<Error> point(std::uint64_t i);
   std::optional<Error> view();
 };
 
@@ -121,23 +102,6 @@ std::optional<Error> Reader::view() {
   return {};
 }
 
-std::optional<Error> Reader::point(std::uint64_t i) {
-  const std::string of = " of point " + std::to_string(i);
-  std::array<double, 3> X{};
-  if (auto e = reals(X, "a coordinate" + of)) return e;
-  problem.add_point(X[0], X[1], X[2]);
-  std::array<std::uint8_t, 3> colour{};
-  for (std::uint8_t& c : colour)
-    if (auto e = integer(c, "a colour, 0 to 255," + of)) return e;
-  metadata.point_colours.push_back(colour);
-  std::uint64_t views = 0;
-  if (auto e = integer(views, "the number of views" + of)) return e;
-  if (views > size / kLeastView) return in.refuse("a number of views that the file can hold," + of);
-  for (std::uint64_t k = 0; k < views; ++k)
-    if (auto e = view()) return e;
-  return {};
-}
-
 void put(std::string& out, double value, char separator) {
   char buffer[40];
   out.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr) += separator;
@@ -189,7 +153,7 @@ void put_points(const ColmapForm& form, const double* measured, std::string& out
 
 Result<Problem> parse_nvm(std::string_view text, const std::string& name,
                           std::vector<std::string>& notes) {
-  Reader reader{LineCursor(text, name), text.size(), false, {}, {}, {}};
+  Reader reader{{LineCursor(text, name), text.size()}, false, {}};
   LineCursor& in = reader.in;
   std::string_view mark;
   in.next_line();
@@ -209,7 +173,7 @@ Result<Problem> parse_nvm(std::string_view text, const std::string& name,
   if (points > text.size() / kLeastPoint)
     return in.refuse("a number of points that the file can hold");
   for (std::uint64_t i = 0; i < points; ++i)
-    if (auto e = reader.point(i)) return *e;
+    if (auto e = reader.point(i, kLeastView, [&] { return reader.view(); })) return *e;
   // Behind a model: another one, or 0 and what VisualSFM adds for its own use.
   std::uint64_t more = 0;
   if (in.seek_field() && in.read_integer(more) && more > 0)

@@ -105,7 +105,7 @@ struct Engine {
 
 void expect_textbook_path(const Problem& start, const Case& c) {
   const Places at(start, c.fixed);
-  const DensePath path(Normal(start, at, c.loss), c.damping);
+  const DensePath path(Normal(start, at, c.loss, Charts(start)), c.damping);
   const double newton = path.newton().norm(), cauchy = path.cauchy().norm();
   Engine engine(start, c);
   EXPECT_LT(cauchy, newton);
@@ -124,14 +124,14 @@ void expect_textbook_path(const Problem& start, const Case& c) {
     const Eigen::VectorXd least = path.cauchy() * std::min(1.0, radius / cauchy);
     EXPECT_GE(trial.predicted_decrease, path.decrease(least) * (1 - 1e-9));
     Problem stepped = start;
-    move(stepped, at, path.unscaled(s));
+    move(stepped, at, path.unscaled(s), Charts(start));
     const double cost = robust_cost(stepped, c.loss);
     EXPECT_NEAR(trial.cost, cost, 1e-6 * cost);
     EXPECT_GE(trial.damping, c.damping * (1 - 1e-4));
   }
   // What is held after accept() is the step that was tried last.
   Problem expected = start, taken = start;
-  move(expected, at, path.unscaled(path.at(1e-3 * cauchy)));
+  move(expected, at, path.unscaled(path.at(1e-3 * cauchy)), Charts(start));
   engine.system.accept();
   engine.system.store(taken);
   for (std::size_t i = 0; i < start.points.size(); ++i)
@@ -189,7 +189,7 @@ Eigen::VectorXd step_between(const Problem& from, const Problem& to, const Place
 /// Cauchy point; asked at once or after a longer one.
 void expect_step_within_radius(const Problem& start, const Case& c) {
   const Places at(start, c.fixed);
-  const DensePath path(Normal(start, at, c.loss), c.damping);
+  const DensePath path(Normal(start, at, c.loss, Charts(start)), c.damping);
   for (double share : {2.0, 0.8, 0.4, 0.1, 1e-2, 1e-4})
     for (bool at_once : {false, true}) {
       const double radius = share * path.newton().norm();
@@ -264,7 +264,7 @@ TEST(Dogleg, IsTheTextbooksWithSharedLenses) {
 TEST(Dogleg, TheBestStepOfThePlaneIsTheBest) {
   const Problem problem = first_points(small_scene().start, 40);
   const Places at(problem, {});
-  const DensePath path(Normal(problem, at, {}), 1e-4);
+  const DensePath path(Normal(problem, at, {}, Charts(problem)), 1e-4);
   // v and some direction that is no Newton point.
   const Eigen::VectorXd v = path.cauchy(), n = path.newton() + 3 * path.newton().cwiseAbs();
   const DoglegPlane plane{v.squaredNorm(),      path.curvature(v, v), v.dot(n), n.squaredNorm(),

@@ -6,9 +6,20 @@
 #include <cmath>
 
 #include "geometry/bal_camera.h"
-#include "geometry/rigid_motion.h"
+#include "linear/scaling.h"
 
 namespace sheaf {
+namespace {
+
+Vector3<double> centre(const Pose& pose) {
+  const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+  Vector3<double> C{};
+  for (int k = 0; k < 3; ++k)
+    for (int r = 0; r < 3; ++r) C[k] -= R[3 * r + k] * pose.translation[r];
+  return C;
+}
+
+}  // namespace
 
 Places::Places(const Problem& p, const Fixed& fixed) {
   const auto free = [](const std::vector<std::uint32_t>& ids, std::size_t i) {
@@ -23,7 +34,33 @@ Places::Places(const Problem& p, const Fixed& fixed) {
   for (std::size_t i = 0; i < p.points.size(); ++i) point.push_back(fixed.points ? -1 : count++);
 }
 
-Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss)
+Charts::Charts(const Problem& p, PointParametrisation points) : host(p.num_points(), UINT32_MAX) {
+  for (std::size_t i = 0; i < p.num_observations(); ++i)
+    host[p.observation_point[i]] = std::min(host[p.observation_point[i]], p.observation_image[i]);
+  const auto images = static_cast<double>(p.num_images());
+  for (const Pose& pose : p.poses)
+    for (int k = 0; k < 3; ++k) rules.origin[k] += centre(pose)[k] / images;
+  double length = 0;
+  for (const Pose& pose : p.poses) {
+    const Vector3<double> C = centre(pose), O = rules.origin;
+    length += std::hypot(C[0] - O[0], C[1] - O[1], C[2] - O[2]) / images;
+  }
+  rules.unit = towards_one(length);
+  if (points == PointParametrisation::homogeneous) rules.base = ChartBase::origin;
+  if (points == PointParametrisation::inverse_depth) rules.base = ChartBase::host;
+}
+
+Vector3<double> Charts::base(const Problem& p, std::size_t point) const {
+  return rules.base == ChartBase::host ? centre(p.poses[host[point]]) : rules.origin;
+}
+
+PointChart<double> Charts::at(const Problem& p, std::size_t point) const {
+  const Vector3<double> C = base(p, point);
+  const double* X = &p.points[3 * point];
+  return {rules, {X[0] - C[0], X[1] - C[1], X[2] - C[2]}};
+}
+
+Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const Charts& charts)
     : A(static_cast<std::size_t>(at.count) * at.count), b(at.count) {
   for (std::size_t i = 0; i < p.num_observations(); ++i) {
     const std::size_t image = p.observation_image[i], point = p.observation_point[i];
@@ -44,8 +81,9 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss)
         entries.emplace_back(at.pose[6 * image + c], w * j.camera[9 * row + c]);
       for (int c = 0; c < 3; ++c)
         entries.emplace_back(at.lens[3 * lens + c], w * j.camera[9 * row + 6 + c]);
-      for (int c = 0; c < 3; ++c)
-        entries.emplace_back(at.point[3 * point + c], w * j.point[3 * row + c]);
+      Vector3<double> by_point{j.point[3 * row], j.point[3 * row + 1], j.point[3 * row + 2]};
+      if (charts.rules.base != ChartBase::none) by_point = charts.at(p, point).transpose(by_point);
+      for (int c = 0; c < 3; ++c) entries.emplace_back(at.point[3 * point + c], w * by_point[c]);
       add_row(entries, w * r[row]);
     }
   }
@@ -76,7 +114,23 @@ std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b) {
   return b;
 }
 
-void move(Problem& p, const Places& at, const std::vector<double>& x) {
+namespace {
+
+/// The coordinates q of a point in its chart, whose base moves with the image it is about.
+void move_in_chart(const Problem& before, const Charts& charts, std::size_t point,
+                   const Vector3<double>& q, Problem& p) {
+  const Vector3<double> C = charts.base(before, point), moved = charts.base(p, point);
+  const PointChart<double> chart = charts.at(before, point);
+  Vector3<double> d = chart.apply(q);
+  for (int k = 0; k < 3; ++k) d[k] -= moved[k] - C[k];
+  const Vector3<double> Y = chart.retract(charts.rules, d);
+  for (int k = 0; k < 3; ++k) p.points[3 * point + k] = moved[k] + Y[k];
+}
+
+}  // namespace
+
+void move(Problem& p, const Places& at, const std::vector<double>& x, const Charts& charts) {
+  const Problem before = p;
   const auto step = [&](int place) { return place < 0 ? 0 : x[place]; };
   for (std::size_t i = 0; i < p.num_images(); ++i) {
     Vector3<double> rho, phi;
@@ -88,7 +142,13 @@ void move(Problem& p, const Places& at, const std::vector<double>& x) {
   }
   for (std::size_t i = 0; i < at.lens.size(); ++i)
     p.cameras[i / 3].parameters[i % 3] += step(at.lens[i]);
-  for (std::size_t i = 0; i < at.point.size(); ++i) p.points[i] += step(at.point[i]);
+  for (std::size_t i = 0; i < p.num_points() && at.point[3 * i] >= 0; ++i) {
+    const Vector3<double> q{x[at.point[3 * i]], x[at.point[3 * i + 1]], x[at.point[3 * i + 2]]};
+    if (charts.rules.base != ChartBase::none)
+      move_in_chart(before, charts, i, q, p);
+    else
+      for (int k = 0; k < 3; ++k) p.points[3 * i + k] += q[k];
+  }
 }
 
 Problem first_points(const Problem& p, std::uint32_t points) {

@@ -7,6 +7,9 @@
 #include <vector>
 
 #include "geometry/loss.h"
+#include "geometry/point_chart.h"
+#include "geometry/rigid_motion.h"
+#include "sheaf/options.h"
 #include "sheaf/problem.h"
 
 // A step by the textbook: the whole Jacobian's normal equations as a dense matrix, cameras and
@@ -21,12 +24,22 @@ struct Places {
   Places(const Problem& p, const Fixed& fixed);
 };
 
+/// The coordinates that the textbook's points step in.
+struct Charts {
+  ChartRules rules;
+  std::vector<std::uint32_t> host;  ///< first image that sees the point
+
+  explicit Charts(const Problem& p, PointParametrisation points = PointParametrisation::xyz);
+  Vector3<double> base(const Problem& p, std::size_t point) const;
+  PointChart<double> at(const Problem& p, std::size_t point) const;
+};
+
 /// A = J^T J, row-major, and b = -J^T r.
 struct Normal {
   std::vector<double> A, b;
   double cost = 0;
 
-  Normal(const Problem& p, const Places& at, const ScaledLoss& loss);
+  Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const Charts& charts);
 
  private:
   void add_row(const std::vector<std::pair<int, double>>& entries, double r);
@@ -36,7 +49,7 @@ struct Normal {
 std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b);
 
 /// Steps every free parameter by x.
-void move(Problem& p, const Places& at, const std::vector<double>& x);
+void move(Problem& p, const Places& at, const std::vector<double>& x, const Charts& charts);
 
 /// Only what the first `points` points contribute: small enough for the textbook.
 Problem first_points(const Problem& p, std::uint32_t points);
