@@ -38,7 +38,8 @@ struct Row {
 /// docs/math.md has the exact formulas; frozen: A = f d (-1/P.z) [I | p] without the term in p p^T.
 Row linearize(const Problem& problem, std::size_t i, bool frozen) {
   const std::uint32_t image = problem.observation_image[i];
-  const auto& [f, k1, k2] = problem.cameras[problem.image_camera[image]].parameters;
+  const auto& lens = problem.cameras[problem.image_camera[image]].parameters;
+  const double f = lens[0], k1 = lens[1], k2 = lens[2];
   const Matrix3<double> rotation = matrix_from_quaternion(problem.poses[image].rotation);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(rotation.data());
   const Eigen::Map<const Eigen::Vector3d> t(problem.poses[image].translation.data()),

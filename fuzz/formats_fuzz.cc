@@ -26,7 +26,7 @@ using Reader = sheaf::Result<sheaf::Problem> (*)(std::string_view, const std::st
                                                  std::vector<std::string>&);
 
 void check(Reader read, sheaf::Result<std::string> (*format)(const sheaf::Problem&),
-           std::string_view bytes) {
+           std::string_view bytes, bool exact) {
   std::vector<std::string> notes;
   const sheaf::Result<sheaf::Problem> problem = read(bytes, "input", notes);
   if (!problem.ok()) {
@@ -43,7 +43,9 @@ void check(Reader read, sheaf::Result<std::string> (*format)(const sheaf::Proble
   require(text.ok(), "what was read can be written");
   const sheaf::Result<sheaf::Problem> again = read(text.value(), "again", notes);
   require(again.ok(), "what was written can be read");
-  require(sheaf::state_hash(again.value()) == sheaf::state_hash(problem.value()), "it is the same");
+  if (exact)
+    require(sheaf::state_hash(again.value()) == sheaf::state_hash(problem.value()),
+            "it is the same");
   require(format(again.value()).value() == text.value(), "and is written the same");
 }
 
@@ -52,8 +54,10 @@ void check(Reader read, sheaf::Result<std::string> (*format)(const sheaf::Proble
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   if (bytes.starts_with(sheaf::kBundlerMark))
-    check(sheaf::parse_bundler, sheaf::format_bundler, bytes);
-  if (bytes.starts_with(sheaf::kNvmMark)) check(sheaf::parse_nvm, sheaf::format_nvm, bytes);
-  if (sheaf::is_libmv(bytes)) check(sheaf::parse_libmv, nullptr, bytes);
+    check(sheaf::parse_bundler, sheaf::format_bundler, bytes, true);
+  // Matrices and translations are written as quaternions and centres, which rounds.
+  if (bytes.starts_with(sheaf::kNvmMark))
+    check(sheaf::parse_nvm, sheaf::format_nvm, bytes, !bytes.starts_with("NVM_V3_R9T"));
+  if (sheaf::is_libmv(bytes)) check(sheaf::parse_libmv, nullptr, bytes, true);
   return 0;
 }

@@ -42,16 +42,7 @@ std::optional<Error> Reader::image(std::uint32_t i) {
     image_of_listed.push_back(kUnplaced);
     return {};
   }
-  for (std::size_t a = 0; a < 9; a += 3)
-    for (std::size_t b = 0; b < 9; b += 3) {
-      const double product = R[a] * R[b] + R[a + 1] * R[b + 1] + R[a + 2] * R[b + 2];
-      if (!(std::abs(product - (a == b)) < 1e-3))
-        return in.refuse_at(line + 1,
-                            "found rows that are not orthonormal, expected the rotation" + of);
-    }
-  const Vector3<double> third = cross<double>({R[0], R[1], R[2]}, {R[3], R[4], R[5]});
-  if (!(third[0] * R[6] + third[1] * R[7] + third[2] * R[8] > 0))
-    return in.refuse_at(line + 1, "found a reflection, expected the rotation" + of);
+  if (auto e = rotation(R, line + 1, of)) return e;
   image_of_listed.push_back(problem.add_image(
       {rotation_from_stated(R), t}, Camera{CameraModel::bal, {lens[0], lens[1], lens[2]}}));
   metadata.image_ids.push_back(i);

@@ -46,6 +46,7 @@ std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
   if (matrices) {
     std::array<double, 9> R{};
     if (auto e = reals(R, "an entry of the rotation" + of)) return e;
+    if (auto e = rotation(R, in.line_number(), of)) return e;
     pose.rotation = rotation_from_stated(R);
     if (auto e = reals(pose.translation, "an entry of the translation" + of)) return e;
   } else {
@@ -69,6 +70,8 @@ std::optional<Error> Reader::image(std::uint64_t i) {
   std::string_view name;
   in.seek_field();
   if (!in.read_word(name)) return in.refuse("the name" + of);
+  if (name.find('\r') != name.npos || name.find('\0') != name.npos)
+    return in.refuse_as("found a zero byte or half a line's end, expected the name" + of);
   metadata.image_names.emplace_back(name);
   std::array<double, 1> f{}, r{}, zero{};
   if (auto e = reals(f, "the focal length" + of)) return e;

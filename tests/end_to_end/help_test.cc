@@ -83,10 +83,11 @@ TEST_P(Help, ExampleRuns) {
   TemporaryFolder folder;
   ASSERT_EQ(run_command({"generate", "problem.txt", "--points", "300"}, folder.path()).exit_code,
             0);
-  if (std::string(GetParam()) == "photometric")
+  if (std::string(GetParam()) == "photometric") {
     ASSERT_EQ(run_command({"generate", "scene", "--photometric", "--points", "200"}, folder.path())
                   .exit_code,
               0);
+  }
   std::vector<std::string> words =
       example_in(run_command({GetParam(), "--help"}, folder.path()).out);
   ASSERT_GE(words.size(), 2u);
