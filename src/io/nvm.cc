@@ -72,6 +72,7 @@ std::optional<Error> Reader::image(std::uint64_t i) {
   if (!in.read_word(name)) return in.refuse("the name" + of);
   if (name.find('\r') != name.npos || name.find('\0') != name.npos)
     return in.refuse_as("found a zero byte or half a line's end, expected the name" + of);
+  if (name.starts_with('#')) return in.refuse_as("found a comment, expected the name" + of);
   metadata.image_names.emplace_back(name);
   std::array<double, 1> f{}, r{}, zero{};
   if (auto e = reals(f, "the focal length" + of)) return e;
@@ -213,9 +214,11 @@ Result<std::string> format_nvm(const Problem& given) {
   const ColmapForm form = colmap_form(problem);
   std::string out = "NVM_V3\n\n" + std::to_string(problem.num_images()) + "\n";
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
-    if (form.names[j].find_first_of(" \t\r\n") != std::string::npos || form.names[j].empty())
-      return Error(ErrorCode::usage, "the image name '" + form.names[j] +
-                                         "' has blanks or is empty, which NVM cannot state");
+    if (form.names[j].find_first_of(" \t\r\n") != std::string::npos || form.names[j].empty() ||
+        form.names[j].front() == '#')
+      return Error(ErrorCode::usage,
+                   "the image name '" + form.names[j] +
+                       "' has blanks, starts with # or is empty, which NVM cannot state");
     out.append(form.names[j]) += ' ';
     put(out, problem.cameras[problem.image_camera[j]].parameters[0], ' ');
     for (const double q : form.rotation(j)) put(out, q, ' ');
