@@ -159,7 +159,7 @@ def check_suite():
     assert "| a | 1 | 0.90 | 1 |" in suite_report.memory_table(documents)
     assert "| a | cost_converged | double | 1 | 6 | 8 |" in suite_report.end_table(documents)
     drawn = suite_report.plots(results)
-    assert {"suite-profile-0.001.svg", "suite-growth.svg", "cost-a-1.svg", "cost-b-1.svg"} <= set(drawn)
+    assert {"suite-profile-0.001.svg", "suite-growth.svg", "cost-a-1-threads.svg", "cost-b-1-threads.svg"} <= set(drawn)
     for svg in drawn.values():
         xml.dom.minidom.parseString(svg)
     section = suite_report.markdown(results, "plots")

@@ -188,10 +188,11 @@ def curves(document):
 
 
 def plot_name(document):
-    """cost-dubrovnik-16-1.svg: the problem by its family and number of images, and the threads."""
+    """cost-16-images-1-threads.svg: plots are ours, and are not named like the files they show."""
     stem = os.path.splitext(document["problem"])[0]
-    short = re.match(r"[a-z]+-\d+(?=-\d+-pre$)", stem)
-    return f"cost-{short.group() if short else stem}-{document['threads']}.svg"
+    images = re.match(r"[a-z]+-(\d+)(?:-\d+-pre)?(-k2zero)?$", stem)
+    short = f"{images[1]}-images{images[2] or ''}" if images else stem
+    return f"cost-{short}-{document['threads']}-threads.svg"
 
 
 def write_results(results, out):
