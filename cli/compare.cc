@@ -205,12 +205,7 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
   verb.add_option("--fix", a.limits.fix,
                   "what every solver holds, as in solve; one that cannot is a row that says so")
       ->type_name("LIST")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            Fixed ignored;
-            return parse_fix(text, ignored);
-          },
-          ""));
+      ->check(parsed_by<Fixed>(parse_fix));
   verb.add_option("--time-to", a.taus, "times until the cost is within these parts of the best")
       ->type_name("TAUS")
       ->delimiter(',')

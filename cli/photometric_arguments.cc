@@ -47,12 +47,7 @@ void add_model_options(CLI::App& verb, PhotometricArguments& a) {
                   "fx,fy,cx,cy of all images, pixels, instead of intrinsics.txt; the first pixel's "
                   "centre is (0, 0)")
       ->type_name("FX,FY,CX,CY")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            Pinhole ignored;
-            return parse_intrinsics(text, ignored);
-          },
-          ""));
+      ->check(parsed_by<Pinhole>(parse_intrinsics));
   verb.add_option("--interpolation", a.interpolation,
                   "bicubic (Catmull-Rom, exact slopes), bilinear (slopes are central differences) "
                   "or bilinear-exact")

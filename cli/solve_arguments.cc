@@ -190,12 +190,7 @@ void add_model_options(CLI::App& verb, SolveArguments& a) {
                   "median residual, in rounds); :gnc at the end starts the last three wide and "
                   "tightens them")
       ->type_name("NAME[:SCALE|:auto][:gnc]")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            Loss ignored;
-            return parse_loss(text, ignored);
-          },
-          ""))
+      ->check(parsed_by<Loss>(parse_loss))
       ->capture_default_str();
   verb.add_option(
           "--cheirality", a.cheirality,
@@ -217,12 +212,7 @@ void add_model_options(CLI::App& verb, SolveArguments& a) {
           "hold these to the last bit: a comma-separated list of points, poses, intrinsics, "
           "f, k1, k2, pose=K, camera=K")
       ->type_name("LIST")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            Fixed ignored;
-            return parse_fix(text, ignored);
-          },
-          ""));
+      ->check(parsed_by<Fixed>(parse_fix));
 }
 
 /// When it ends.

@@ -39,5 +39,15 @@ void add_demo(CLI::App& app, int& exit_code);
 CLI::Validator whole_number_from(long long lowest, const std::string& what);
 CLI::Validator number_in(double lowest, double highest, bool lowest_too, const std::string& what);
 CLI::Validator one_of(const std::vector<std::string>& names);
+/// What `parse(text, value)` takes into a Value; it returns what is wrong, or nothing.
+template <class Value, class Parse>
+CLI::Validator parsed_by(Parse parse) {
+  return CLI::Validator(
+      [parse](std::string& text) {
+        Value ignored;
+        return std::string(parse(text, ignored));
+      },
+      "");
+}
 
 }  // namespace sheaf
