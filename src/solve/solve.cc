@@ -115,6 +115,16 @@ void tell(const Choice& choice, const SolveOptions& options, const Kernels& kern
   if (options.on_plan) options.on_plan(summary);
 }
 
+/// Refines what is set up, and stores it.
+template <class Home>
+void run(Home& system, Problem& problem, SolveOptions options, const Stopwatch& clock,
+         Summary& summary) {
+  summary.setup_s = clock.seconds();
+  if (options.initial_damping == 0) options.initial_damping = default_damping(problem.num_images());
+  minimize_in_rounds(system, options, clock, summary);
+  system.store(problem);
+}
+
 /// Points held, no lens shared: images by themselves.
 Result<void> refine_images(Problem& problem, const SolveOptions& options, const Kernels& kernels,
                            const std::vector<std::uint8_t>& skip, Columns columns, Threads& threads,
@@ -127,12 +137,7 @@ Result<void> refine_images(Problem& problem, const SolveOptions& options, const 
                      options.cheirality != Cheirality::formula, image_kernels(kernels.name),
                      threads);
   if (system.count_behind() > 0) summary.behind_camera_before = behind_camera(problem, threads);
-  summary.setup_s = clock.seconds();
-  SolveOptions resolved = options;
-  if (resolved.initial_damping == 0)
-    resolved.initial_damping = default_damping(problem.num_images());
-  minimize_in_rounds(system, resolved, clock, summary);
-  system.store(problem);
+  run(system, problem, options, clock, summary);
   summary.solve_s = clock.seconds() - summary.setup_s;
   if (system.count_behind() > 0) summary.behind_camera_after = behind_camera(problem, threads);
   return {};
@@ -181,12 +186,7 @@ Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels
                         threads);
     if (!lends && system.count_behind() > 0)
       summary.behind_camera_before = behind_camera(problem, threads);
-    summary.setup_s = clock.seconds();
-    SolveOptions resolved = options;
-    if (resolved.initial_damping == 0)
-      resolved.initial_damping = default_damping(problem.num_images());
-    minimize_in_rounds(system, resolved, clock, summary);
-    system.store(problem);
+    run(system, problem, options, clock, summary);
     behind_after = system.count_behind() > 0;
   }
   summary.solve_s = clock.seconds() - summary.setup_s;

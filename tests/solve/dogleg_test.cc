@@ -139,12 +139,6 @@ void expect_textbook_path(const Problem& start, const Case& c) {
   EXPECT_FALSE(engine.propose(newton).reused);
 }
 
-Fixed points_held() {
-  Fixed fixed;
-  fixed.points = true;
-  return fixed;
-}
-
 TEST(Dogleg, IsTheTextbooks) {
   const Problem problem = first_points(small_scene().start, 40);
   for (SolverKind solver : {SolverKind::dense, SolverKind::sparse})

@@ -66,12 +66,6 @@ void expect_textbook_step(const Problem& start, const Fixed& fixed, double dampi
 
 const std::vector<double> kDampings = {1e-4, 1e-2, 1, 100};
 
-Fixed points_held() {
-  Fixed fixed;
-  fixed.points = true;
-  return fixed;
-}
-
 TEST(Step, IsTheTextbooks) {
   const Problem problem = first_points(small_scene().start, 40);
   for (double damping : kDampings) expect_textbook_step(problem, {}, damping);

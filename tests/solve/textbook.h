@@ -51,6 +51,12 @@ std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b);
 /// Steps every free parameter by x.
 void move(Problem& p, const Places& at, const std::vector<double>& x, const Charts& charts);
 
+inline Fixed points_held() {
+  Fixed fixed;
+  fixed.points = true;
+  return fixed;
+}
+
 /// Only what the first `points` points contribute: small enough for the textbook.
 Problem first_points(const Problem& p, std::uint32_t points);
 
