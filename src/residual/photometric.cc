@@ -106,11 +106,14 @@ PatchGrid make_grid(const Pattern& pattern) {
         grid.dy.push_back(static_cast<float>(grid.top + row));
       }
   grid.mask.assign(grid.dx.size(), 0);
+  grid.cell_at.assign(static_cast<std::size_t>(grid.width * grid.rows), -1);
   for (std::size_t k = 0; k < pattern.size(); ++k)
     for (std::uint32_t cell = 0; cell < grid.cells(); ++cell)
       if (grid.dx[cell] == pattern.dx[k] && grid.dy[cell] == pattern.dy[k]) {
         grid.mask[cell] = 1;
         grid.place.push_back(cell);
+        const int row = pattern.dy[k] - grid.top, column = pattern.dx[k] - grid.left;
+        grid.cell_at[static_cast<std::size_t>(grid.width * row + column)] = static_cast<int>(cell);
       }
   return grid;
 }

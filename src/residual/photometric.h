@@ -15,9 +15,9 @@
 
 namespace sheaf {
 
-/// A pattern on a grid that the kernels walk with eight lanes. Wide patterns: a strip is eight
-/// columns, lane by lane, and a step is a row. Patterns of up to four columns: the lower four lanes
-/// walk the upper half of the rows and the upper four the lower half.
+/// A pattern on a grid. Where each pixel is projected by itself, eight lanes walk it. Wide
+/// patterns: a strip is eight columns, lane by lane, and a step is a row. Patterns of up to four
+/// columns: the lower four lanes walk the upper half of the rows and the upper four the lower half.
 struct PatchGrid {
   int left = 0, top = 0;             ///< least dx and dy
   int width = 0, rows = 0;           ///< extent
@@ -26,6 +26,7 @@ struct PatchGrid {
   std::vector<float> mask;           ///< 1 where the pattern has a pixel, else 0; strip, step, lane
   std::vector<float> dx, dy;         ///< of every cell of `mask`
   std::vector<std::uint32_t> place;  ///< of the pattern's pixel k in `mask`
+  std::vector<int> cell_at;  ///< width x rows: where a pixel of the rectangle is in `mask`, or -1
 
   std::size_t cells() const { return mask.size(); }
   int right() const { return left + width - 1; }

@@ -1,8 +1,9 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <limits>
+#include <algorithm>
 #include <string_view>
 
+#include "platform/buffer.h"
 #include "platform/simd_targets.h"
 #include "residual/photometric.h"
 
@@ -15,6 +16,8 @@
 #include "residual/loss_lanes-inl.h"
 #include "residual/patch_sums-inl.h"
 #include "residual/rows-inl.h"
+#include "residual/translated_patches-inl.h"
+#include "residual/warped_patches-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -22,21 +25,9 @@ namespace HWY_NAMESPACE {
 
 static_assert(kRowBatch == kJacobianFields * kLanes * kParts);
 
-/// Where the lanes' points are: P in the camera's frame, and the patch's middle in the image.
-struct Place {
-  V P[3], iz, x, y;
-};
-
-HWY_INLINE Place place_points(const Pinhole& camera, const V* c, const V* d, V s) {
-  Place at;
-  for (int r = 0; r < 3; ++r)
-    at.P[r] =
-        fma(c[3 * r], d[0], fma(c[3 * r + 1], d[1], fma(c[3 * r + 2], d[2], hn::Mul(s, c[9 + r]))));
-  at.iz = hn::Div(set(1.0), at.P[2]);
-  at.x = fma(set(camera.fx), hn::Mul(at.P[0], at.iz), set(camera.cx));
-  at.y = fma(set(camera.fy), hn::Mul(at.P[1], at.iz), set(camera.cy));
-  return at;
-}
+/// Squared slopes of a patch, summed, below which there is no texture: where an image is saturated
+/// they are some 1e-28, and points that see nothing else would step by noise over noise.
+constexpr double kNoTexture = 1e-12;
 
 /// The first two rows of the Cholesky factor of the Gram matrix of (gx, gy, -g, -1), and as much
 /// of the residual: G = R^T R, R h = G^T r. A pivot that is rounding leaves a row of zeros.
@@ -48,13 +39,13 @@ template <bool kBrightness>
 HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
   Whitened w;
   const V none = zero();
-  const auto first = hn::Gt(sums[kGxx], set(1e-30));
+  const auto first = hn::Gt(sums[kGxx], set(kNoTexture));
   const V i1 = hn::IfThenElse(first, hn::Div(set(1.0), hn::Sqrt(sums[kGxx])), none);
   w.r11 = hn::Mul(sums[kGxx], i1);
   w.r12 = hn::Mul(sums[kGxy], i1);
   w.h[0] = hn::Mul(sums[kGxr], i1);
   const V left = fnma(w.r12, w.r12, sums[kGyy]);
-  const auto second = hn::Gt(left, fma(set(1e-12), sums[kGyy], set(1e-30)));
+  const auto second = hn::Gt(left, fma(set(1e-12), sums[kGyy], set(kNoTexture)));
   const V i2 = hn::IfThenElse(second, hn::Div(set(1.0), hn::Sqrt(left)), none);
   w.r22 = hn::Mul(left, i2);
   w.h[1] = hn::Mul(fnma(w.r12, w.h[0], sums[kGyr]), i2);
@@ -104,73 +95,10 @@ HWY_INLINE LaneJacobian rows_of(const Whitened& w, const Pinhole& camera, const 
   return j;
 }
 
-/// Where the pixels of one lane's patch go; false where a corner of it leaves the image.
-HWY_INLINE bool warp_patch(const PhotometricInput& in, std::uint32_t block, const double* P,
-                           PatchAt& patch) {
-  const double* R = in.views + kViewRecord * block;
-  const PatchGrid& grid = *in.grid;
-  for (int i = 0; i < 3; ++i) {
-    patch.P[i] = P[i];
-    patch.along[i] = R[3 * i] / in.camera.fx;
-    patch.down[i] = R[3 * i + 1] / in.camera.fy;
-  }
-  for (int dx : {grid.left, grid.right()})
-    for (int dy : {grid.top, grid.bottom()}) {
-      double Q[3];
-      for (int i = 0; i < 3; ++i) Q[i] = P[i] + dx * patch.along[i] + dy * patch.down[i];
-      const Pinhole& k = in.camera;
-      if (!(Q[2] > 0) ||
-          !pixel_fits(*patch.plane, k.fx * (Q[0] / Q[2]) + k.cx, k.fy * (Q[1] / Q[2]) + k.cy))
-        return false;
-    }
-  return true;
-}
-
 struct CollapseSums {
   V cost[kParts], square[kParts];
   std::uint64_t left = 0;
 };
-
-/// The sums of a part's patches, into scratch; 1 in `inside` for those that fit, and no place in
-/// `seen` for the others. Returns how many of these there are.
-template <bool kBrightness, bool kRays>
-HWY_INLINE std::uint64_t sum_lanes(const PhotometricInput& in, const Batches::Group& group,
-                                   std::size_t g, int lane, const std::uint32_t* block, const V* c,
-                                   const Place& at, double* seen, double* inside, double* scratch) {
-  std::uint64_t left = 0;
-  alignas(64) double P[3][8], alpha[8], beta[8];
-  for (int i = 0; i < 3; ++i) store(at.P[i], P[i]);
-  store(c[12], alpha), store(c[13], beta);
-  for (int l = 0; l < kLanes; ++l) {
-    double* to = scratch + 8 * l;
-    const bool used = static_cast<std::uint32_t>(lane + l) < group.lanes;
-    PatchAt patch{&in.planes[in.block_image[block[l]]],
-                  seen[l],
-                  seen[8 + l],
-                  alpha[l],
-                  beta[l],
-                  nullptr,
-                  {},
-                  {},
-                  {}};
-    bool fits = used && P[2][l] > 0 && patch_fits(*in.grid, *patch.plane, seen[l], seen[8 + l]);
-    if (kRays && in.warped && fits) {
-      const double middle[3] = {P[0][l], P[1][l], P[2][l]};
-      fits = warp_patch(in, block[l], middle, patch);
-    }
-    inside[l] = fits ? 1 : 0;
-    if (fits) {
-      const std::size_t point = in.batches->lane_point[8 * g + static_cast<std::size_t>(lane + l)];
-      patch.reference = in.references + in.grid->cells() * point;
-      sum_patch<kBrightness>(in, patch, to);
-    } else {
-      for (int k = 0; k < kPatchSums<kBrightness>; ++k) store_zeros(to + kSumStride * k);
-      seen[l] = seen[8 + l] = std::numeric_limits<double>::quiet_NaN();
-      left += used;
-    }
-  }
-  return left;
-}
 
 /// The patches of one batch's part.
 template <bool kBrightness, bool kRays>
@@ -190,10 +118,12 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& 
   double* seen = out.seen + 16 * b + lane;
   store(at.x, seen), store(at.y, seen + 8);
   alignas(64) double inside[8];
-  sums.left +=
-      sum_lanes<kBrightness, kRays>(in, group, g, lane, block, c, at, seen, inside, scratch);
+  const PatchLanes lanes{std::clamp(static_cast<int>(group.lanes) - lane, 0, kLanes),
+                         &batches.lane_point[8 * g + lane], block, c[12], c[13]};
   V of[kPatchSums<kBrightness>];
-  for (int k = 0; k < kPatchSums<kBrightness>; ++k) of[k] = add_lanes(scratch + kSumStride * k);
+  sums.left += kRays && in.warped
+                   ? sum_warped_lanes<kBrightness>(in, lanes, at, seen, inside, scratch, of)
+                   : sum_translated_lanes<kBrightness>(in, lanes, at, scratch, seen, inside, of);
   V cost = of[kCost];
   if (in.loss_per_patch) {
     const Rho rho = rho_lanes(LossLanes(in.loss), of[kSquare]);
@@ -218,14 +148,18 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& 
 template <bool kBrightness, bool kRays>
 void collapse_groups(const PhotometricInput& in, std::uint32_t first, std::uint32_t end,
                      PhotometricOutput& out) {
-  alignas(64) double scratch[kSumScratch];
+  Buffer<double> scratch;  // sums of warped patches; references of others
+  const bool warped = kRays && in.warped;
+  scratch.allocate(warped ? kSumScratch : kLanes * in.grid->cells());
   CollapseSums sums;
   for (int p = 0; p < kParts; ++p) sums.cost[p] = sums.square[p] = zero();
   for (std::uint32_t g = first; g < end; ++g) {
     const Batches::Group group = in.batches->groups[g];
-    for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-      for (int p = 0; p < kParts; ++p)
-        collapse_part<kBrightness, kRays>(in, group, g, b, p, scratch, out, sums);
+    for (int p = 0; p < kParts; ++p) {
+      if (!warped) spread_references(in, group, g, p, scratch.data());
+      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+        collapse_part<kBrightness, kRays>(in, group, g, b, p, scratch.data(), out, sums);
+    }
   }
   alignas(64) double lanes[8];
   for (int p = 0; p < kParts; ++p) store(sums.cost[p], lanes + p * kLanes);
