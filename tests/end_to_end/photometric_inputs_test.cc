@@ -73,6 +73,22 @@ TEST_F(PhotometricInputs, RgbdComesBackFromDisturbedPoses) {
   EXPECT_EQ(contents_of(folder_ / "out/rgb/1 a.png"), contents_of(folder_ / "in/rgb/1 a.png"));
 }
 
+TEST_F(PhotometricInputs, PointsAreChosenAsAsked) {
+  write_folder(numbered_folder(options_, generate(options_).value().truth), folder_ / "in");
+  const auto patches = [&](const std::string& tolerance) {
+    EXPECT_EQ(run({"photometric", "in", "--depth-scale", "10000", "--every", "2", "--max-points",
+                   "50", "--min-slope", "1", "--cell", "12", "--depth-tolerance", tolerance,
+                   "--max-iterations", "1", "--json", "1.json"})
+                  .exit_code,
+              0);
+    const auto json = json_of(folder_ / "1.json");
+    EXPECT_EQ(json["input"]["images"], 2);
+    EXPECT_EQ(json["input"]["points"], 50);
+    return int(json["patches"]["total"]);
+  };
+  EXPECT_LT(patches("0.0001"), patches("0.1"));
+}
+
 TEST_F(PhotometricInputs, AColmapModelIsRefinedAndKept) {
   options_.start_px = 1.5;
   const PhotometricScene scene = generate(options_).value();
