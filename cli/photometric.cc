@@ -46,7 +46,9 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   check_outputs({{"--json", arguments.common.json}});
   PhotometricFolder folder =
-      read_photometric(arguments.in, camera_of(arguments.photometric)).value();
+      read_photometric(arguments.in, read_options(arguments.photometric.input)).value();
+  std::optional<PoseErrors> before, after;
+  if (!folder.given_poses.empty()) before = pose_errors(folder);
   PhotometricProblem& problem = folder.problem;
   Progress progress(arguments.common.quiet);
   PhotometricOptions options = photometric_options(arguments.photometric);
@@ -59,19 +61,25 @@ int run(const Arguments& arguments) {
   interrupt.begin_solve();
   const PhotometricSummary summary = refine_photometric(problem, options).value();
   interrupt.begin_write();
+  if (before) after = pose_errors(folder);
   const Timer writing;
   const bool usable = summary.solve.usable();
   if (usable && !arguments.out.empty()) write_photometric(folder, arguments.out).value();
   const double write_s = writing.seconds();
   fmt::print("{}: {} images, {} points\n", arguments.in, problem.images.size(),
              problem.num_points());
+  for (const std::string& note : folder.notes) fmt::print("note        {}\n", note);
   fmt::print("{}", summary_text(summary));
+  if (before)
+    fmt::print("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
+               before->rotation_rad, after->rotation_rad, before->center, after->center);
   for (std::size_t i = 0; i < problem.brightness.size(); ++i)
     fmt::print("image {:<5} a {:.4f}, b {:.3f}\n", i, problem.brightness[i].a,
                problem.brightness[i].b);
   if (!arguments.common.json.empty()) {
-    const PhotometricRecord record{arguments.in, arguments.photometric, folder.read_s, write_s,
-                                   total.seconds()};
+    const PhotometricRecord record{arguments.in,  folder.format, arguments.photometric,
+                                   folder.read_s, write_s,       total.seconds(),
+                                   before,        after};
     write_json(photometric_json(record, summary, problem), arguments.common.json);
   }
   return exit_code_of(summary.solve.termination);
@@ -83,19 +91,23 @@ void add_photometric(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb =
       *app.add_subcommand("photometric", "refine poses and points from the pixels of images");
-  verb.add_option(
-          "IN", arguments->in,
-          "folder with poses.txt, points.txt and 0.png, 1.png, ... (docs/photometric.md has "
-          "the formats)")
+  verb.add_option("IN", arguments->in,
+                  "folder of images with poses and points, of RGB-D images with poses, or of a "
+                  "COLMAP model "
+                  "of pinholes (told by its files: docs/photometric.md)")
       ->type_name("FOLDER")
       ->required();
-  verb.add_option("-o,--output", arguments->out,
-                  "folder for the refined state in the same format, and brightness.txt")
+  verb.add_option("-o,--output", arguments->out, "folder for the refined state in the same format")
       ->type_name("FOLDER");
   add_photometric_options(verb, arguments->photometric);
   add_common_options(verb, arguments->common);
   verb.footer(
       "Example:\n  sheaf photometric scene -o refined --json photometric.json\n"
+      "\nRGB-D images, depths as measured, from coarse to fine:\n"
+      "  sheaf photometric rgbd --intrinsics 525,525,319.5,239.5 --fix points --levels 4 -o "
+      "refined\n"
+      "\nA COLMAP model with its images:\n"
+      "  sheaf photometric sparse/0 --images images -o refined\n"
       "\nA scene to try it on:\n  sheaf generate scene --photometric");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

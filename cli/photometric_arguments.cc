@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "photometric_arguments.h"
 
-#include <array>
-#include <charconv>
-#include <cmath>
 #include <limits>
 #include <map>
 
@@ -27,27 +24,7 @@ const std::map<std::string, Parametrisation> kParametrisations = {
     {"xyz", Parametrisation::xyz},
     {"inverse-depth", Parametrisation::inverse_depth}};
 
-std::string parse_intrinsics(const std::string& text, Pinhole& out) {
-  std::array<double, 4> v{};
-  const char *p = text.data(), *end = p + text.size();
-  for (std::size_t k = 0; k < v.size(); ++k) {
-    const auto [stop, error] = std::from_chars(p, end, v[k]);
-    const bool last = k + 1 == v.size();
-    if (error != std::errc() || !std::isfinite(v[k]) || (k < 2 && v[k] == 0) ||
-        (last ? stop != end : stop == end || *stop != ','))
-      return "expected fx,fy,cx,cy in pixels, focal lengths not 0, not '" + text + "'";
-    p = last ? stop : stop + 1;
-  }
-  out = {v[0], v[1], v[2], v[3]};
-  return "";
-}
-
 void add_model_options(CLI::App& verb, PhotometricArguments& a) {
-  verb.add_option("--intrinsics", a.intrinsics,
-                  "fx,fy,cx,cy of all images, pixels, instead of intrinsics.txt; the first pixel's "
-                  "centre is (0, 0)")
-      ->type_name("FX,FY,CX,CY")
-      ->check(parsed_by<Pinhole>(parse_intrinsics));
   verb.add_option("--interpolation", a.interpolation,
                   "bicubic (Catmull-Rom, exact slopes), bilinear (slopes are central differences) "
                   "or bilinear-exact")
@@ -128,6 +105,7 @@ void add_patch_options(CLI::App& verb, PhotometricArguments& a) {
 void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
   const double inf = std::numeric_limits<double>::infinity();
   const double most = std::numeric_limits<double>::max();
+  add_photometric_input_options(verb, a.input);
   add_model_options(verb, a);
   add_patch_options(verb, a);
   verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
@@ -175,13 +153,6 @@ PhotometricOptions photometric_options(const PhotometricArguments& a) {
   options.fix_points = a.fix == "points";
   options.initial_damping = a.initial_damping;
   return options;
-}
-
-std::optional<Pinhole> camera_of(const PhotometricArguments& a) {
-  if (a.intrinsics.empty()) return {};
-  Pinhole camera;
-  parse_intrinsics(a.intrinsics, camera);
-  return camera;
 }
 
 }  // namespace sheaf

@@ -3,16 +3,16 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <optional>
 #include <string>
 
+#include "photometric_input.h"
 #include "sheaf/photometric.h"
 
 namespace sheaf {
 
 /// The options of a photometric refinement as the command line states them.
 struct PhotometricArguments {
-  std::string intrinsics;
+  PhotometricInputArguments input;
   int max_iterations = PhotometricOptions().max_iterations;
   double tolerance = PhotometricOptions().tolerance;
   double motion_px = PhotometricOptions().motion_px;
@@ -36,6 +36,5 @@ void add_photometric_options(CLI::App& verb, PhotometricArguments& arguments);
 
 /// Everything but threads and callbacks. The arguments have passed their validators.
 PhotometricOptions photometric_options(const PhotometricArguments& arguments);
-std::optional<Pinhole> camera_of(const PhotometricArguments& arguments);
 
 }  // namespace sheaf

@@ -8,24 +8,25 @@ namespace sheaf {
 namespace {
 
 Json options_json(const PhotometricArguments& a) {
-  return {{"intrinsics", a.intrinsics.empty() ? Json() : Json(a.intrinsics)},
-          {"interpolation", a.interpolation},
-          {"brightness", a.brightness},
-          {"loss", a.loss},
-          {"loss_on", a.loss_on},
-          {"leaving", a.leaving},
-          {"points", a.points},
-          {"warp", a.warp},
-          {"pattern", a.pattern},
-          {"levels", a.levels},
-          {"rounds", a.rounds},
-          {"min_zncc", a.min_zncc},
-          {"fix", a.fix.empty() ? Json() : Json(a.fix)},
-          {"max_iterations", a.max_iterations},
-          {"tolerance", a.tolerance},
-          {"motion_px", number(a.motion_px)},
-          {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
-          {"initial_damping", a.initial_damping}};
+  Json options = photometric_input_json(a.input);
+  options.update({{"interpolation", a.interpolation},
+                  {"brightness", a.brightness},
+                  {"loss", a.loss},
+                  {"loss_on", a.loss_on},
+                  {"leaving", a.leaving},
+                  {"points", a.points},
+                  {"warp", a.warp},
+                  {"pattern", a.pattern},
+                  {"levels", a.levels},
+                  {"rounds", a.rounds},
+                  {"min_zncc", a.min_zncc},
+                  {"fix", a.fix.empty() ? Json() : Json(a.fix)},
+                  {"max_iterations", a.max_iterations},
+                  {"tolerance", a.tolerance},
+                  {"motion_px", number(a.motion_px)},
+                  {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
+                  {"initial_damping", a.initial_damping}});
+  return options;
 }
 
 }  // namespace
@@ -39,7 +40,10 @@ Json photometric_json(const PhotometricRecord& record, const PhotometricSummary&
   return {
       {"version", SHEAF_VERSION},
       {"input",
-       {{"path", record.in}, {"images", problem.images.size()}, {"points", problem.num_points()}}},
+       {{"path", record.in},
+        {"format", record.format},
+        {"images", problem.images.size()},
+        {"points", problem.num_points()}}},
       {"options", options_json(record.arguments)},
       {"solver", {{"name", s.solver}}},
       {"simd", s.simd},
@@ -60,6 +64,7 @@ Json photometric_json(const PhotometricRecord& record, const PhotometricSummary&
        {{"before", number(summary.initial_median_grey)},
         {"after", number(summary.final_median_grey)}}},
       {"brightness", brightness},
+      {"poses", pose_errors_json(record.before, record.after)},
       {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
       {"iterations", iterations_json(s)},
       {"time",

@@ -21,7 +21,7 @@ install(FILES ${PROJECT_BINARY_DIR}/sheafConfig.cmake
               ${PROJECT_BINARY_DIR}/sheafConfigVersion.cmake DESTINATION ${SHEAF_PACKAGE_DIR})
 
 # A static library hands its own dependencies on to whoever links it; a shared one keeps them.
-set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb -lpng -lz -lbz2 -pthread")
+set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb -lpng -ljpeg -lz -lbz2 -pthread")
 if(BUILD_SHARED_LIBS)
   set(SHEAF_PC_LIBS "")
 else()

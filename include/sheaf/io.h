@@ -73,25 +73,47 @@ Result<void> write_ply(const Problem& before, const Problem& after,
 /// A photometric problem and what its folder has beside it.
 struct PhotometricFolder {
   PhotometricProblem problem;
-  std::string format;                        ///< "direct"
-  std::vector<double> times;                 ///< one for each image, as the folder states them
-  std::vector<std::filesystem::path> files;  ///< of the images, or empty: not from files
+  std::string format;              ///< "direct", "rgbd", "rgbd-numbered", "colmap" or "colmap-text"
+  std::vector<double> times;       ///< one for each image, as the folder states them, or empty
+  std::filesystem::path source{};  ///< the folder; empty: not from files
+  std::vector<std::filesystem::path> files{};        ///< of the images, or empty: not from files
+  std::vector<std::filesystem::path> depth_files{};  ///< of their depth maps ("rgbd")
+  std::vector<Pose> given_poses{};           ///< as the folder has them, where these were disturbed
+  Problem model{};                           ///< of a COLMAP model: what the state is written into
+  std::vector<std::uint32_t> model_point{};  ///< its point that each point is
+  std::vector<std::string> notes{};          ///< sentences about what of the folder is left out
   double read_s = 0;                         ///< seconds spent reading and decoding
 };
 
-/// Reads a folder of images with poses and points:
-///   poses.txt       a line per image: time, cam_from_world translation, quaternion x y z w
-///   points.txt      a line per point: X Y Z, then the grey levels of its 4x4 patch
-///   0.png, 1.png    an image per pose
-///   intrinsics.txt  fx fy cx cy, unless `camera` gives them
-///   hosts.txt       if there: a line per point, the image and pixel x y that its patch is taken
-///   from brightness.txt  if there: a line per image, a b
-/// Errors: ErrorCode::unreadable_input, or usage where intrinsics are missing.
-Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
-                                           const std::optional<Pinhole>& camera = {});
+struct PhotometricReadOptions {
+  std::optional<Pinhole> camera{};  ///< of all images, instead of what the folder says
+  PoseNoise noise{};                ///< disturbs the poses, before it is decided what they see
+  int every = 1;                    ///< RGB-D: takes the first image and every so many after it
+  /// RGB-D: what a depth image has for one scene unit; 0 in it is no depth.
+  double depth_scale = 5000;
+  int cell_px = 16;                  ///< RGB-D: at most one point in each square of this size
+  double least_slope = 2;            ///< RGB-D: grey levels per pixel that a point needs
+  std::uint32_t max_points = 20000;  ///< RGB-D: those with the steepest slopes
+  double depth_tolerance =
+      0.1;  ///< RGB-D, relative: a patch counts where a depth map has its depth
+  std::filesystem::path images{};  ///< of a COLMAP model; empty: its folder's own "images"
+};
 
-/// Writes the state in the same format into a folder, which is made where it is not there; images
-/// that were read are copied, others become PNG of 8 bits. Errors: ErrorCode::unwritable_output.
+/// Reads a folder of images with poses and points. What it is, its files tell:
+///   poses.txt                          "direct": images 0.png, 1.png, ... and points.txt, with
+///                                      their patches, or the pixels of their hosts
+///   rgb.txt, depth.txt, groundtruth.txt  "rgbd": lists of grey or colour images and depth maps by
+///                                      time, and a trajectory, as TUM's benchmark has them
+///   pose.txt, color/, depth/           "rgbd-numbered": the same, by number
+///   cameras.bin or cameras.txt         a COLMAP model of pinholes, whose images lie elsewhere
+/// docs/photometric.md describes them. Errors: ErrorCode::unreadable_input; usage where intrinsics
+/// or images are missing and for lenses that are no pinholes.
+Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
+                                           const PhotometricReadOptions& options = {});
+
+/// Writes the state in the folder's format into a folder, which is made where it is not there;
+/// images that were read are copied (not those of a COLMAP model), others become PNG of 8 bits.
+/// Errors: ErrorCode::unwritable_output.
 Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path);
 
 }  // namespace sheaf

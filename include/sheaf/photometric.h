@@ -63,6 +63,9 @@ struct PhotometricProblem {
   std::vector<std::uint32_t> host;     ///< one for each point, or empty
   std::vector<double> host_xy;         ///< 2 x points, pixels
   std::vector<Brightness> brightness;  ///< one for each image, or empty: all (1, 0)
+  /// Patches that may count, those of a point in ascending order of images: what is known to be
+  /// hidden is left out. Empty: every point in every image but its host.
+  std::vector<std::uint32_t> sight_point, sight_image;
 
   std::size_t num_points() const { return points.size() / 3; }
   bool has_hosts() const { return !host.empty(); }
@@ -71,6 +74,18 @@ struct PhotometricProblem {
 /// Checks sizes, index ranges, finite numbers and unit quaternions. The message names the first
 /// offending entry.
 Result<void> validate(const PhotometricProblem& problem);
+
+/// How far poses are moved for an experiment.
+struct PoseNoise {
+  double rotation_rad = 0;  ///< every image is turned by this, about an axis of its own,
+  double center = 0;  ///< and its centre moved by this, scene units, in a direction of its own
+  std::uint64_t seed = 1;
+};
+
+/// Disturbs the poses; points on rays keep their place and depth in their host. The same options
+/// give the same bytes on every machine. Errors: ErrorCode::usage for what is negative or not
+/// finite.
+Result<void> disturb(PhotometricProblem& problem, const PoseNoise& noise);
 
 /// How an image is read between its pixels.
 enum class Interpolation {

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "io/folder_files.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 
@@ -30,7 +32,16 @@ Result<void> parse_direct_brightness(std::string_view text, const std::string& n
 Result<void> parse_direct_intrinsics(std::string_view text, const std::string& name,
                                      PhotometricFolder& folder);
 
-/// A file's bytes, whatever its size turns out to be.
-Result<std::string> bytes_of(const std::filesystem::path& path);
+/// fx fy cx cy: as given, or from intrinsics.txt. Errors: usage where there is neither.
+Result<void> find_intrinsics(const FolderFiles& files, const std::optional<Pinhole>& camera,
+                             PhotometricFolder& folder);
+
+/// The folder as a whole, not yet validated.
+Result<PhotometricFolder> read_direct(const FolderFiles& files,
+                                      const PhotometricReadOptions& options);
+Result<void> write_direct(const PhotometricFolder& folder, const std::filesystem::path& path);
+
+/// brightness.txt and intrinsics.txt, as every format writes them.
+Result<void> write_looks(const PhotometricProblem& problem, const std::filesystem::path& path);
 
 }  // namespace sheaf

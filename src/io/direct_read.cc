@@ -1,37 +1,14 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <new>
 #include <optional>
+#include <utility>
 
-#include "image/png.h"
 #include "io/direct_folder.h"
 #include "io/token_reader.h"
 
 namespace sheaf {
-namespace {
-
-namespace fs = std::filesystem;
-
-}  // namespace
-
-Result<std::string> bytes_of(const fs::path& path) {
-  Result<RawBytes> raw = RawBytes::open(path);
-  if (!raw.ok()) return raw.error();
-  std::string out;
-  constexpr std::size_t kBlock = 1 << 18;
-  for (;;) {
-    const std::size_t before = out.size();
-    out.resize(before + kBlock);
-    const Result<std::size_t> n = raw.value().read(out.data() + before, kBlock);
-    if (!n.ok()) return n.error();
-    out.resize(before + n.value());
-    if (n.value() < kBlock) return out;
-  }
-}
-
 namespace {
 
 std::optional<Error> read_reals(TokenReader& in, double* to, std::size_t count, const char* what,
@@ -43,68 +20,52 @@ std::optional<Error> read_reals(TokenReader& in, double* to, std::size_t count, 
   return {};
 }
 
-Result<GreyImage> read_grey(const fs::path& path) {
-  const Result<std::string> bytes = bytes_of(path);
-  if (!bytes.ok()) return bytes.error();
-  const Result<Raster> raster = decode_png(bytes.value(), path.string());
-  if (!raster.ok()) return raster.error();
-  return GreyImage{raster.value().width, raster.value().height, grey_of(raster.value())};
-}
+using Parse = Result<void> (*)(std::string_view, const std::string&, PhotometricFolder&);
 
-Result<void> read_text(const fs::path& path,
-                       Result<void> (*parse)(std::string_view, const std::string&,
-                                             PhotometricFolder&),
+Result<void> read_text(const FolderFiles& files, const std::string& name, Parse parse,
                        PhotometricFolder& folder) {
-  const Result<std::string> text = bytes_of(path);
+  const Result<std::string> text = files.bytes(name);
   if (!text.ok()) return text.error();
-  return parse(text.value(), path.string(), folder);
+  return parse(text.value(), files.name(name), folder);
 }
 
-/// fx fy cx cy, unless they are given.
-Result<void> find_intrinsics(const fs::path& path, const std::optional<Pinhole>& camera,
+}  // namespace
+
+Result<void> find_intrinsics(const FolderFiles& files, const std::optional<Pinhole>& camera,
                              PhotometricFolder& folder) {
-  const fs::path file = path / "intrinsics.txt";
   if (camera) {
     folder.problem.camera = *camera;
     return {};
   }
-  if (!fs::exists(file))
-    return Error(ErrorCode::usage, path.string() +
-                                       ": no intrinsics.txt (fx fy cx cy) in this folder, and no "
-                                       "intrinsics given");
-  return read_text(file, parse_direct_intrinsics, folder);
+  if (files.has("intrinsics.txt"))
+    return read_text(files, "intrinsics.txt", parse_direct_intrinsics, folder);
+  return Error(ErrorCode::usage, files.folder.string() +
+                                     ": no intrinsics.txt (fx fy cx cy) in this folder, and no "
+                                     "intrinsics given");
 }
 
-Result<PhotometricFolder> read_folder(const fs::path& path, const std::optional<Pinhole>& camera) {
-  const auto start = std::chrono::steady_clock::now();
+Result<PhotometricFolder> read_direct(const FolderFiles& files,
+                                      const PhotometricReadOptions& options) {
   PhotometricFolder folder;
   folder.format = "direct";
   PhotometricProblem& problem = folder.problem;
-  if (auto k = find_intrinsics(path, camera, folder); !k.ok()) return k.error();
-  if (auto poses = read_text(path / "poses.txt", parse_direct_poses, folder); !poses.ok())
-    return poses.error();
-  if (auto points = read_text(path / "points.txt", parse_direct_points, folder); !points.ok())
-    return points.error();
-  if (fs::exists(path / "hosts.txt"))
-    if (auto hosts = read_text(path / "hosts.txt", parse_direct_hosts, folder); !hosts.ok())
-      return hosts.error();
-  if (fs::exists(path / "brightness.txt"))
-    if (auto looks = read_text(path / "brightness.txt", parse_direct_brightness, folder);
-        !looks.ok())
-      return looks.error();
+  if (auto k = find_intrinsics(files, options.camera, folder); !k.ok()) return k.error();
+  for (const auto& [name, parse] : {std::pair<const char*, Parse>{"poses.txt", parse_direct_poses},
+                                    {"points.txt", parse_direct_points}})
+    if (auto read = read_text(files, name, parse, folder); !read.ok()) return read.error();
+  for (const auto& [name, parse] : {std::pair<const char*, Parse>{"hosts.txt", parse_direct_hosts},
+                                    {"brightness.txt", parse_direct_brightness}})
+    if (files.has(name))
+      if (auto read = read_text(files, name, parse, folder); !read.ok()) return read.error();
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    folder.files.push_back(path / (std::to_string(i) + ".png"));
-    Result<GreyImage> image = read_grey(folder.files.back());
+    const std::string name = std::to_string(i) + ".png";
+    folder.files.push_back(files.folder / name);
+    Result<GreyImage> image = grey_in(files, name);
     if (!image.ok()) return image.error();
     problem.images.push_back(std::move(image).value());
   }
-  if (Result<void> valid = validate(problem); !valid.ok())
-    return Error(ErrorCode::unreadable_input, path.string() + ": " + valid.error().what());
-  folder.read_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return folder;
 }
-
-}  // namespace
 
 Result<void> parse_direct_poses(std::string_view text, const std::string& name,
                                 PhotometricFolder& folder) {
@@ -194,15 +155,6 @@ Result<void> parse_direct_intrinsics(std::string_view text, const std::string& n
   if (!in.at_end()) return in.unexpected("the end of the file behind fx fy cx cy");
   folder.problem.camera = {k[0], k[1], k[2], k[3]};
   return {};
-}
-
-Result<PhotometricFolder> read_photometric(const fs::path& path,
-                                           const std::optional<Pinhole>& camera) {
-  try {
-    return read_folder(path, camera);
-  } catch (const std::bad_alloc&) {
-    return Error(ErrorCode::memory_limit, path.string() + ": not enough memory for these images");
-  }
 }
 
 }  // namespace sheaf

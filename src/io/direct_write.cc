@@ -5,34 +5,11 @@
 
 #include "image/png.h"
 #include "io/direct_folder.h"
-#include "io/output_file.h"
-#include "io/text_buffer.h"
 
 namespace sheaf {
 namespace {
 
 namespace fs = std::filesystem;
-
-template <class Put>
-Result<void> write_text(const fs::path& path, const Put& put) {
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
-  if (!out.ok()) return out.error();
-  TextBuffer text(out.value());
-  put(text);
-  text.flush();
-  return out.value().commit();
-}
-
-Result<void> copy_image(const fs::path& from, const fs::path& to) {
-  std::error_code same;
-  if (fs::equivalent(from, to, same)) return {};
-  const Result<std::string> bytes = bytes_of(from);
-  if (!bytes.ok()) return bytes.error();
-  Result<OutputFile> out = OutputFile::create(to, Compression::none);
-  if (!out.ok()) return out.error();
-  out.value().write(bytes.value());
-  return out.value().commit();
-}
 
 /// Grey levels as the nearest of 8 bits.
 Result<void> write_image(const GreyImage& image, const fs::path& to) {
@@ -42,10 +19,7 @@ Result<void> write_image(const GreyImage& image, const fs::path& to) {
         static_cast<std::uint16_t>(std::clamp(std::lround(grey), long{0}, long{255})));
   const Result<std::string> bytes = encode_png(raster);
   if (!bytes.ok()) return bytes.error();
-  Result<OutputFile> out = OutputFile::create(to, Compression::none);
-  if (!out.ok()) return out.error();
-  out.value().write(bytes.value());
-  return out.value().commit();
+  return write_bytes(to, bytes.value());
 }
 
 void put_poses(const PhotometricFolder& folder, TextBuffer& text) {
@@ -83,16 +57,25 @@ void put_points(const PhotometricProblem& problem, TextBuffer& text) {
 
 }  // namespace
 
-Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error)
-    return Error(ErrorCode::unwritable_output,
-                 path.string() + ": the folder cannot be made: " + error.message());
+Result<void> write_looks(const PhotometricProblem& problem, const fs::path& path) {
+  const auto put_intrinsics = [&](TextBuffer& text) {
+    const Pinhole& k = problem.camera;
+    text.put(k.fx, ' '), text.put(k.fy, ' '), text.put(k.cx, ' '), text.put(k.cy, '\n');
+  };
+  if (auto r = write_text_file(path / "intrinsics.txt", put_intrinsics); !r.ok()) return r;
+  if (problem.brightness.empty()) return {};
+  return write_text_file(path / "brightness.txt", [&](TextBuffer& text) {
+    for (const Brightness& of : problem.brightness) text.put(of.a, ' '), text.put(of.b, '\n');
+  });
+}
+
+Result<void> write_direct(const PhotometricFolder& folder, const fs::path& path) {
+  if (auto r = make_folder(path); !r.ok()) return r;
   const PhotometricProblem& problem = folder.problem;
-  if (auto r = write_text(path / "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
+  if (auto r = write_text_file(path / "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
     return r;
-  if (auto r = write_text(path / "points.txt", [&](auto& t) { put_points(problem, t); }); !r.ok())
+  if (auto r = write_text_file(path / "points.txt", [&](auto& t) { put_points(problem, t); });
+      !r.ok())
     return r;
   const auto put_hosts = [&](TextBuffer& text) {
     for (std::size_t i = 0; i < problem.host.size(); ++i) {
@@ -101,21 +84,12 @@ Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& 
     }
   };
   if (problem.has_hosts())
-    if (auto r = write_text(path / "hosts.txt", put_hosts); !r.ok()) return r;
-  const auto put_intrinsics = [&](TextBuffer& text) {
-    const Pinhole& k = problem.camera;
-    text.put(k.fx, ' '), text.put(k.fy, ' '), text.put(k.cx, ' '), text.put(k.cy, '\n');
-  };
-  if (auto r = write_text(path / "intrinsics.txt", put_intrinsics); !r.ok()) return r;
-  const auto put_brightness = [&](TextBuffer& text) {
-    for (const Brightness& of : problem.brightness) text.put(of.a, ' '), text.put(of.b, '\n');
-  };
-  if (!problem.brightness.empty())
-    if (auto r = write_text(path / "brightness.txt", put_brightness); !r.ok()) return r;
+    if (auto r = write_text_file(path / "hosts.txt", put_hosts); !r.ok()) return r;
+  if (auto r = write_looks(problem, path); !r.ok()) return r;
   for (std::size_t i = 0; i < problem.images.size(); ++i) {
     const fs::path to = path / (std::to_string(i) + ".png");
     if (auto r = folder.files.empty() ? write_image(problem.images[i], to)
-                                      : copy_image(folder.files[i], to);
+                                      : duplicate_file(folder.files[i], to);
         !r.ok())
       return r;
   }

@@ -52,6 +52,20 @@ Result<void> check_images(const PhotometricProblem& p) {
   return {};
 }
 
+Result<void> check_sights(const PhotometricProblem& p) {
+  if (p.sight_point.size() != p.sight_image.size())
+    return wrong("sights are not one point and one image each");
+  for (std::size_t i = 0; i < p.sight_point.size(); ++i) {
+    const std::uint32_t point = p.sight_point[i], image = p.sight_image[i];
+    if (point >= p.num_points() || image >= p.images.size())
+      return wrong(entry("sight", i) + ": no such point or image");
+    if (i > 0 && (point < p.sight_point[i - 1] ||
+                  (point == p.sight_point[i - 1] && image <= p.sight_image[i - 1])))
+      return wrong(entry("sight", i) + " is not in the order of points and their images");
+  }
+  return {};
+}
+
 Result<void> check_references(const PhotometricProblem& p) {
   const std::size_t points = p.num_points();
   if (p.points.size() != 3 * points || points == 0)
@@ -68,13 +82,16 @@ Result<void> check_references(const PhotometricProblem& p) {
       if (!std::isfinite(p.patches[i]))
         return wrong(entry("the patch of point", i / p.patch.size()) + " is not finite");
   }
+  if (Result<void> sights = check_sights(p); !sights.ok()) return sights;
   if (!p.has_hosts()) return {};
   if (p.host.size() != points || p.host_xy.size() != 2 * points)
     return wrong("hosts are not one image and one pixel for each point");
-  for (std::size_t i = 0; i < points; ++i)
-    if (p.host[i] >= p.images.size() || !all_finite(&p.host_xy[2 * i], 2))
-      return wrong(entry("the host of point", i) +
-                   ": no such image, or a pixel that is not finite");
+  for (std::size_t i = 0; i < points; ++i) {
+    const double x = p.host_xy[2 * i], y = p.host_xy[2 * i + 1];
+    if (p.host[i] >= p.images.size() || !(x >= 0 && x <= p.images[p.host[i]].width - 1) ||
+        !(y >= 0 && y <= p.images[p.host[i]].height - 1))
+      return wrong(entry("the host of point", i) + ": no such image, or a pixel outside of it");
+  }
   return {};
 }
 

@@ -124,6 +124,10 @@ void store_state(const PatchState& state, bool rays, PhotometricProblem& problem
 
 std::vector<Sight> all_sights(const PhotometricProblem& problem, bool rays) {
   std::vector<Sight> sights;
+  for (std::size_t k = 0; k < problem.sight_point.size(); ++k)
+    if (!rays || problem.host[problem.sight_point[k]] != problem.sight_image[k])
+      sights.push_back({problem.sight_point[k], problem.sight_image[k]});
+  if (!problem.sight_point.empty()) return sights;
   for (std::uint32_t i = 0; i < problem.num_points(); ++i)
     for (std::uint32_t j = 0; j < problem.images.size(); ++j)
       if (!rays || problem.host[i] != j) sights.push_back({i, j});

@@ -20,7 +20,8 @@ PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOp
 PatchState state_of(const PhotometricProblem& problem, bool rays);
 void store_state(const PatchState& state, bool rays, PhotometricProblem& problem);
 
-/// Every point in every image; with rays not in its host, which shows the patch as it is.
+/// The problem's sights, or every point in every image; with rays not in its host, which shows the
+/// patch as it is.
 std::vector<Sight> all_sights(const PhotometricProblem& problem, bool rays);
 
 /// Zero-normalised cross-correlation of a sight's patch and its image, in [-1, 1]; 0 where either

@@ -61,7 +61,7 @@ TEST_F(PhotometricCommand, SaysWhatIsWrong) {
     EXPECT_EQ(outcome.exit_code, code) << outcome.err;
     EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
   };
-  refused(3, {"photometric", "nowhere", "--intrinsics", "1,1,0,0"}, "nowhere/poses.txt");
+  refused(3, {"photometric", "nowhere", "--intrinsics", "1,1,0,0"}, "nowhere: no such folder");
   refused(2, {"photometric", "scene", "--intrinsics", "1,1,0"}, "fx,fy,cx,cy");
   refused(2, {"photometric", "scene", "--points", "xyz", "--levels", "2"}, "pyramid");
   refused(2, {"photometric", "scene", "--pattern", "2x2"}, "4x4");

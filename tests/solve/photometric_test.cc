@@ -275,8 +275,9 @@ class PhotometricCourse : public testing::Test {
     const char* data = std::getenv("SHEAF_DATA");
     folder_ = std::filesystem::path(data ? data : "data") / "direct/directba-shenlan-l7";
     if (!std::filesystem::exists(folder_)) GTEST_SKIP() << folder_ << " is not there";
-    problem_ =
-        read_photometric(folder_, Pinhole{277.34, 291.402, 312.234, 239.777}).value().problem;
+    problem_ = read_photometric(folder_, {.camera = Pinhole{277.34, 291.402, 312.234, 239.777}})
+                   .value()
+                   .problem;
   }
   static PhotometricOptions compatible() {
     PhotometricOptions options;

@@ -1,0 +1,20 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "image/grey.h"
+#include "sheaf/error.h"
+
+namespace sheaf {
+
+/// The samples of a JPEG file, grey or colour, as they are stored: a camera's note on how it was
+/// held turns nothing. Errors: ErrorCode::unreadable_input with `name` in front.
+Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name);
+
+/// PNG or JPEG, told by the first bytes.
+Result<Raster> decode_image(std::string_view bytes, const std::string& name);
+
+}  // namespace sheaf

@@ -1,0 +1,71 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "io/folder_files.h"
+
+#include "image/jpeg.h"
+#include "io/byte_source.h"
+
+namespace sheaf {
+
+namespace fs = std::filesystem;
+
+Result<std::string> bytes_of(const fs::path& path) {
+  Result<RawBytes> raw = RawBytes::open(path);
+  if (!raw.ok()) return raw.error();
+  std::string out;
+  constexpr std::size_t kBlock = 1 << 18;
+  for (;;) {
+    const std::size_t before = out.size();
+    out.resize(before + kBlock);
+    const Result<std::size_t> n = raw.value().read(out.data() + before, kBlock);
+    if (!n.ok()) return n.error();
+    out.resize(before + n.value());
+    if (n.value() < kBlock) return out;
+  }
+}
+
+FolderFiles files_in(const fs::path& folder) {
+  return {folder,
+          [folder](const std::string& name) {
+            std::error_code ignored;
+            return fs::exists(folder / name, ignored);
+          },
+          [folder](const std::string& name) { return bytes_of(folder / name); }};
+}
+
+Result<Raster> raster_in(const FolderFiles& files, const std::string& name) {
+  const Result<std::string> bytes = files.bytes(name);
+  if (!bytes.ok()) return bytes.error();
+  return decode_image(bytes.value(), files.name(name));
+}
+
+Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name) {
+  const Result<Raster> raster = raster_in(files, name);
+  if (!raster.ok()) return raster.error();
+  return GreyImage{raster.value().width, raster.value().height, grey_of(raster.value())};
+}
+
+Result<void> make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error) return {};
+  return Error(ErrorCode::unwritable_output,
+               folder.string() + ": the folder cannot be made: " + error.message());
+}
+
+Result<void> write_bytes(const fs::path& path, const std::string& bytes) {
+  Result<OutputFile> out = OutputFile::create(path, Compression::none);
+  if (!out.ok()) return out.error();
+  out.value().write(bytes);
+  return out.value().commit();
+}
+
+Result<void> duplicate_file(const fs::path& from, const fs::path& to) {
+  std::error_code same;
+  if (fs::equivalent(from, to, same)) return {};
+  const Result<std::string> bytes = bytes_of(from);
+  if (!bytes.ok()) return bytes.error();
+  return write_bytes(to, bytes.value());
+}
+
+}  // namespace sheaf
