@@ -26,10 +26,17 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
                     "--occluder", "--start"});
   if (verb == "photometric")
-    options.insert({"--output", "--intrinsics", "--interpolation", "--brightness", "--loss",
-                    "--loss-on", "--leaving", "--fix", "--points", "--warp", "--pattern",
-                    "--levels", "--rounds", "--min-zncc", "--max-iterations", "--tolerance",
-                    "--motion", "--time-limit", "--initial-damping"});
+    options.insert({"--output",         "--ply",
+                    "--pictures",       "--intrinsics",
+                    "--interpolation",  "--brightness",
+                    "--loss",           "--loss-on",
+                    "--leaving",        "--fix",
+                    "--points",         "--warp",
+                    "--pattern",        "--levels",
+                    "--rounds",         "--min-zncc",
+                    "--max-iterations", "--tolerance",
+                    "--motion",         "--memory-limit",
+                    "--time-limit",     "--initial-damping"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
