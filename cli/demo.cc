@@ -11,6 +11,7 @@
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "photometric_demo.h"
 #include "progress.h"
 #include "report/errors.h"
 #include "scene_arguments.h"
@@ -90,12 +91,15 @@ int run(const Arguments& arguments) {
   const double cpu_before_s = processor_seconds();
   const Summary summary = try_solve(problem, options).value();
   const double cpu_s = processor_seconds() - cpu_before_s;
+  const PhotometricDemo photometric =
+      run_photometric_demo(arguments.scene.seed, arguments.common.threads, interrupt.token());
   interrupt.begin_write();
 
   const StateErrors before = compare_states(scene.start, scene.truth, true).value();
   const StateErrors after = compare_states(problem, scene.truth, true).value();
   fmt::print("{}", summary_text(summary, 0));
   tell_end(arguments.scene, problem, summary, before, after);
+  tell(photometric);
   const Timer writing;
   if (!arguments.ply.empty()) write_ply(scene.start, problem, arguments.ply).value();
   if (!json.empty()) {
@@ -109,6 +113,7 @@ int run(const Arguments& arguments) {
                        .total_s = total.seconds()};
     Json document = solve_json(record, summary, problem);
     document["scene"] = scene_options_json(arguments.scene);
+    document["photometric"] = photometric_demo_json(photometric);
     document["errors"] = {{"before", errors_json(before)}, {"after", errors_json(after)}};
     write_json(document, json);
   }
@@ -119,7 +124,8 @@ int run(const Arguments& arguments) {
 
 void add_demo(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("demo", "make a scene, disturb it, solve it, look at it");
+  CLI::App& verb = *app.add_subcommand(
+      "demo", "make a scene, disturb it, solve it, look at it; then one of images");
   add_scene_options(verb, arguments->scene);
   verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
       ->type_name("FILE");

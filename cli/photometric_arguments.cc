@@ -126,6 +126,11 @@ void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
                   "exit with 130")
       ->type_name("SECONDS")
       ->check(number_in(0, inf, false, "a number of seconds above 0"));
+  verb.add_option("--memory-limit", a.memory_limit_bytes,
+                  "refuse (exit 5) rather than exceed this many bytes; units K, M, G are powers of "
+                  "1024")
+      ->type_name("BYTES")
+      ->transform(CLI::AsSizeValue(false));
   verb.add_option("--initial-damping", a.initial_damping, "0: chosen by rule")
       ->type_name("LAMBDA")
       ->check(number_in(0, most, true, "a number from 0 up"))
@@ -138,6 +143,7 @@ PhotometricOptions photometric_options(const PhotometricArguments& a) {
   options.tolerance = a.tolerance;
   options.motion_px = a.motion_px;
   if (a.time_limit_s > 0) options.time_limit_s = a.time_limit_s;
+  options.memory_limit_bytes = a.memory_limit_bytes;
   options.interpolation = kInterpolations.at(a.interpolation);
   options.affine_brightness = a.brightness == "affine";
   parse_loss(a.loss, options.loss);

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "photometric_input.h"
@@ -29,6 +31,7 @@ struct PhotometricArguments {
   int levels = PhotometricOptions().levels;
   int rounds = PhotometricOptions().rounds;
   std::string fix;
+  std::uint64_t memory_limit_bytes = 0;  ///< none
   double initial_damping = 0;
 };
 

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "json_document.h"
 #include "photometric_arguments.h"
@@ -16,10 +17,15 @@ namespace sheaf {
 struct PhotometricRecord {
   std::string in, format;
   PhotometricArguments arguments;
+  std::vector<std::string> pictures;  ///< names in their folder
   double read_s = 0, write_s = 0, total_s = 0;
   std::optional<PoseErrors> before{}, after{};  ///< where poses were disturbed
 };
 Json photometric_json(const PhotometricRecord& record, const PhotometricSummary& summary,
-                      const PhotometricProblem& problem);
+                      const PhotometricDetails& details, const PhotometricProblem& problem);
+
+/// Over the points that patches determine: of the inverse depths, or of X, Y and Z together; NaN of
+/// none.
+double median_sigma(const PhotometricDetails& details);
 
 }  // namespace sheaf

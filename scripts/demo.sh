@@ -22,6 +22,11 @@ echo "demo: a generated scene, nothing to download"
 run demo --ply out/demo.ply
 
 echo
+echo "demo: images of a generated scene, refined from their pixels"
+run generate out/images --photometric --grey-noise 2 --brightness 0.1
+run photometric out/images -o out/images-refined --pictures out/pictures --ply out/images.ply
+
+echo
 if scripts/get-data.sh; then
   scene=${SHEAF_DATA:-data}/bal/dubrovnik-16-22106-pre.txt
   name=dubrovnik-16
@@ -35,5 +40,6 @@ fi
 run solve "$scene" -o "out/$name-refined.txt" --ply "out/$name.ply" --json "out/$name.json"
 
 echo
-echo "demo: solved $scene; in out/ now: $name-refined.txt, $name.json, and $name.ply and demo.ply"
-echo "demo: for a viewer of point clouds (start in grey, result in colour)"
+echo "demo: solved $scene; in out/ now: $name-refined.txt, $name.json, pictures/ of patches before"
+echo "demo: and after, and for a viewer of point clouds (start in grey, result in colour) $name.ply,"
+echo "demo: demo.ply and images.ply"

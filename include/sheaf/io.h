@@ -116,4 +116,21 @@ Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
 /// Errors: ErrorCode::unwritable_output.
 Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path);
 
+/// Writes what `examine_photometric` found into a folder that is there:
+///   visibility.txt  a line per point: the images that its patch is seen in; its host is not listed
+///   sigma.txt       a line per point: the standard deviation of its inverse depth in its host, or
+///   three of X, Y and Z; "inf" where nothing determines it
+/// Errors: ErrorCode::unwritable_output.
+Result<void> write_photometric_details(const PhotometricDetails& details, std::size_t points,
+                                       const std::filesystem::path& path);
+
+/// Poses, lenses and points alone, for `write_ply` and comparisons; pixels count as COLMAP's do.
+Problem cloud_of(const PhotometricProblem& problem);
+
+/// The same, each point in the colour of its pixel: in its host, or, without hosts, in that of the
+/// images `seen` that its patch fits best. Colours are read from the images' files again, where
+/// there are such; points that no image shows are grey. Errors: ErrorCode::unreadable_input.
+Result<Problem> coloured_cloud_of(const PhotometricFolder& folder,
+                                  const std::vector<PatchSight>& seen);
+
 }  // namespace sheaf

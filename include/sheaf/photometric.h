@@ -133,8 +133,27 @@ struct PhotometricOptions {
   double initial_damping = 0;  ///< 0: the default rule
   int threads = 0;             ///< 0: all; the result does not depend on it
   double time_limit_s = std::numeric_limits<double>::infinity();
+  std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   std::function<bool(const Iteration&)> on_iteration{};  ///< return false to stop
   std::stop_token stop{};
+};
+
+/// A patch in an image that shows it.
+struct PatchSight {
+  std::uint32_t point = 0, image = 0;
+  double x = 0, y = 0;  ///< of its middle in the image, pixels
+  double rms_grey = 0;  ///< of its residuals, as the refinement reads them
+};
+
+/// What the images say of a state, patch by patch and point by point.
+struct PhotometricDetails {
+  std::vector<PatchSight> seen;  ///< patches that count at this state: by point, then by image
+  double sigma_grey = 0;         ///< noise of a pixel of the images, from the median residual
+  /// Standard deviations that this noise leaves the points, poses and brightness taken as known:
+  /// one number a point (of its inverse depth, 1 / scene units) or three (of X, Y, Z). Infinite
+  /// where the patches do not determine the point.
+  std::vector<double> sigma;
+  bool of_inverse_depth = false;
 };
 
 /// A scene whose truth is known: waves of grey on a smooth height field, seen by cameras above it.

@@ -98,7 +98,8 @@ struct PhotometricSummary {
   /// Of the residuals of the patches visible at the start, read bilinearly, brightness as it was
   /// and as it became. A patch that left counts as much as it did, and no less than the mean did.
   double initial_rms_grey = 0, final_rms_grey = 0;
-  double initial_median_grey = 0, final_median_grey = 0;  ///< of |r|
+  double initial_median_grey = 0, final_median_grey = 0;    ///< of |r|
+  double initial_inlier_share = 0, final_inlier_share = 0;  ///< |r| of at most 10 grey levels
 };
 
 /// Refines the problem in place. The best state found is stored even when the run was stopped.
@@ -111,5 +112,11 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options = {});
 /// problem that `validate` refuses or options that contradict it.
 Result<PhotometricSummary> refine_photometric(PhotometricProblem& problem,
                                               const PhotometricOptions& options = {});
+
+/// Looks at a state as a round of `refine_photometric` with these options would: which patches
+/// count, how well they fit, and how far the noise of the images leaves each point undetermined
+/// (docs/photometric.md has the formulas). Errors: as above.
+Result<PhotometricDetails> examine_photometric(const PhotometricProblem& problem,
+                                               const PhotometricOptions& options = {});
 
 }  // namespace sheaf

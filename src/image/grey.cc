@@ -18,8 +18,27 @@ std::vector<float> grey_of(const Raster& raster) {
   return grey;
 }
 
+namespace {
+
+std::ptrdiff_t stride_of(int width) {
+  return (GreyPlane::kBorder + width + GreyPlane::kRightBorder + 15) / 16 * 16;
+}
+
+}  // namespace
+
+GreyPlane GreyPlane::frame(int width, int height) {
+  GreyPlane plane;
+  plane.width_ = width, plane.height_ = height;
+  return plane;
+}
+
+std::size_t GreyPlane::bytes(int width, int height) {
+  return sizeof(float) * static_cast<std::size_t>(stride_of(width)) *
+         std::size_t(height + 2 * kBorder);
+}
+
 GreyPlane::GreyPlane(int width, int height, const float* pixels)
-    : width_(width), height_(height), stride_((kBorder + width + kRightBorder + 15) / 16 * 16) {
+    : width_(width), height_(height), stride_(stride_of(width)) {
   pixels_.resize(static_cast<std::size_t>(stride_) * std::size_t(height + 2 * kBorder));
   for (int y = -kBorder; y < height + kBorder; ++y) {
     const float* from = pixels + std::size_t(std::clamp(y, 0, height - 1)) * std::size_t(width);

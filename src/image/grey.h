@@ -27,6 +27,10 @@ class GreyPlane {
 
   GreyPlane() = default;
   GreyPlane(int width, int height, const float* pixels);
+  /// The size alone, no pixel.
+  static GreyPlane frame(int width, int height);
+  /// What a plane of this size holds.
+  static std::size_t bytes(int width, int height);
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -22,6 +22,12 @@ class TextBuffer {
     *p_++ = separator;
   }
 
+  /// Ends a line that has no numbers.
+  void end_line() {
+    if (buffer_.data() + buffer_.size() == p_) flush();
+    *p_++ = '\n';
+  }
+
   void flush() {
     out_.write(buffer_.data(), static_cast<std::size_t>(p_ - buffer_.data()));
     p_ = buffer_.data();

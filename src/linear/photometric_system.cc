@@ -44,8 +44,6 @@ Chunks only_tiles(std::vector<Tile> tiles) {
   return out;
 }
 
-constexpr std::int32_t kMostDenseColumns = 1200;
-
 double norm3(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 }  // namespace
@@ -87,7 +85,6 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
   }
   leaving_.allocate(16 * batches_.num_batches());
   scratch_.resize(static_cast<std::size_t>(threads.count()));
-  // Dense up to where its factor costs about as much as the patches' pixels; then by blocks.
   const SolverKind kind =
       columns_.count <= kMostDenseColumns ? SolverKind::dense : SolverKind::sparse;
   solver_name_ = to_string(kind);

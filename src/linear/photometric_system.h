@@ -32,6 +32,9 @@ struct PhotometricRules {
 /// rows. A camera block is an image's six pose columns, then a and b.
 class PhotometricSystem : public System {
  public:
+  /// Dense up to where its factor costs about as much as the patches' pixels; then by blocks.
+  static constexpr std::int32_t kMostDenseColumns = 1200;
+
   /// Throws std::bad_alloc. The sights are the patches that count, in any order; those that are not
   /// in their image when a loss is first used count as having left.
   PhotometricSystem(const PatchScene& scene, const PatchState& state,

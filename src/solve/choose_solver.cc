@@ -54,13 +54,13 @@ std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 999999) / 1000000) + " MB";
 }
 
-Error over_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more) {
+}  // namespace
+
+Error over_memory_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more) {
   return Error(ErrorCode::memory_limit, "the solver would need " + megabytes(needed) +
                                             ", over the limit of " + megabytes(limit) +
                                             "; nothing was allocated" + more);
 }
-
-}  // namespace
 
 Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
                                  const SolveOptions& options, const MemoryHeld& held) {
@@ -73,7 +73,7 @@ Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
       held.resident_bytes + kCode + ImageSystem::bytes(counts.images, free_columns, batches);
   const Choice choice{plan_solver(counts), std::max(held.peak_bytes, needed)};
   if (options.memory_limit_bytes > 0 && choice.forecast_bytes > options.memory_limit_bytes)
-    return over_limit(choice.forecast_bytes, options.memory_limit_bytes, "");
+    return over_memory_limit(choice.forecast_bytes, options.memory_limit_bytes);
   return choice;
 }
 
@@ -105,10 +105,11 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
     choice.forecast_bytes = lean;
     return choice;
   }
-  return over_limit(choice.forecast_bytes, options.memory_limit_bytes,
-                    lean < choice.forecast_bytes
-                        ? " (the leanest solver, iterative-implicit, needs " + megabytes(lean) + ")"
-                        : "");
+  return over_memory_limit(
+      choice.forecast_bytes, options.memory_limit_bytes,
+      lean < choice.forecast_bytes
+          ? " (the leanest solver, iterative-implicit, needs " + megabytes(lean) + ")"
+          : "");
 }
 
 }  // namespace sheaf

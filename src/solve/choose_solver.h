@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "linear/plan.h"
 #include "sheaf/error.h"
 #include "sheaf/options.h"
@@ -22,6 +25,9 @@ struct Choice {
 };
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
                              const MemoryHeld& held);
+
+/// A forecast over the limit, in words a user can act on.
+Error over_memory_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more = "");
 
 /// Points held and no lens shared: each image by itself. `batches`: count_image_batches.
 Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,

@@ -79,11 +79,18 @@ PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOp
   take_references(problem, pattern, level, scene);
   scene.host = problem.host;
   scene.warped = options.warp != Warp::translation;
+  scene.rays = rays_of(problem);
+  return scene;
+}
+
+std::vector<double> rays_of(const PhotometricProblem& problem) {
+  std::vector<double> rays;
+  rays.reserve(3 * problem.num_points());
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     for (double c : {(problem.host_xy[2 * i] - problem.camera.cx) / problem.camera.fx,
                      (problem.host_xy[2 * i + 1] - problem.camera.cy) / problem.camera.fy, 1.0})
-      scene.rays.push_back(c);
-  return scene;
+      rays.push_back(c);
+  return rays;
 }
 
 PatchState state_of(const PhotometricProblem& problem, bool rays) {

@@ -17,6 +17,9 @@ bool uses_rays(const PhotometricProblem& problem, const PhotometricOptions& opti
 PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOptions& options,
                           const Pattern& pattern, int level);
 
+/// (x, y, 1) of every point's pixel in its host.
+std::vector<double> rays_of(const PhotometricProblem& problem);
+
 PatchState state_of(const PhotometricProblem& problem, bool rays);
 void store_state(const PatchState& state, bool rays, PhotometricProblem& problem);
 

@@ -16,6 +16,9 @@ PatchStatistics::Grey grey_of(std::vector<double> residuals) {
     sum += r * r;
     r = std::abs(r);
   }
+  const auto close = std::count_if(residuals.begin(), residuals.end(),
+                                   [](double r) { return r <= PatchStatistics::kInlier; });
+  out.inliers = static_cast<double>(close) / static_cast<double>(residuals.size());
   out.rms = std::sqrt(sum / static_cast<double>(residuals.size()));
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::nth_element(residuals.begin(), middle, residuals.end());

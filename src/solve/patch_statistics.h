@@ -14,7 +14,9 @@ class PatchStatistics {
  public:
   struct Grey {
     double rms = 0, median = 0;
+    double inliers = 0;  ///< share of the pixels that are off by no more than kInlier
   };
+  static constexpr double kInlier = 10;  ///< grey levels
   /// The scene has to outlive it; `seen` are the patches to measure.
   PatchStatistics(const PatchScene& scene, const std::vector<Sight>& seen);
 

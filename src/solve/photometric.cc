@@ -9,32 +9,17 @@
 #include "linear/kernel_table.h"
 #include "linear/photometric_system.h"
 #include "platform/clock.h"
+#include "platform/memory.h"
 #include "sheaf/solve.h"
+#include "solve/choose_solver.h"
 #include "solve/patch_level.h"
 #include "solve/patch_statistics.h"
+#include "solve/photometric_forecast.h"
+#include "solve/photometric_rules.h"
 #include "solve/trust_region.h"
 
 namespace sheaf {
 namespace {
-
-/// The usual constants keep 95% of the least-squares efficiency on one component.
-double pixel_tuning_constant(LossKind kind) {
-  switch (kind) {
-    case LossKind::none:
-      break;
-    case LossKind::huber:
-      return 1.345;
-    case LossKind::soft_l1:
-      return 1.174;
-    case LossKind::cauchy:
-      return 2.385;
-    case LossKind::tukey:
-      return 4.685;
-    case LossKind::geman_mcclure:
-      return 3.648;
-  }
-  return 1;
-}
 
 class Refinement {
  public:
@@ -46,6 +31,12 @@ class Refinement {
         kernels_(*available_kernels().front()),
         rays_(uses_rays(problem, options)),
         state_(state_of(problem, rays_)) {}
+
+  /// The process's peak resident size.
+  std::uint64_t forecast() {
+    const std::uint64_t more = forecast_photometric(problem_, options_, pattern_, threads_.count());
+    return summary_.solve.forecast_bytes = std::max(peak_resident_bytes(), resident_bytes() + more);
+  }
 
   PhotometricSummary run() {
     Summary& solve = summary_.solve;
@@ -142,9 +133,9 @@ class Refinement {
   /// An automatic scale follows from what is left once brightness is fitted with poses and points
   /// held.
   ScaledLoss scaled_loss(const PatchScene& scene, const std::vector<Sight>& sights) {
-    ScaledLoss loss{options_.loss.kind, options_.loss.scale_px};
     sigma_ = 0;
-    if (loss.kind == LossKind::none || loss.scale_px != kAutomaticScale) return loss;
+    if (options_.loss.kind == LossKind::none || options_.loss.scale_px != kAutomaticScale)
+      return scaled_for(options_, pattern_, 0);
     PhotometricRules held = rules();
     held.poses_held = held.points_held = true;
     PhotometricSystem system(scene, state_, sights, held, kernels_, threads_);
@@ -158,10 +149,7 @@ class Refinement {
       brightness_fitted_ = true;
     }
     sigma_ = std::max(kLeastSigma, kSigmaPerMedian * system.residual_scale(0.5));
-    const double pixels =
-        options_.loss_per_patch ? std::sqrt(static_cast<double>(pattern_.size())) : 1;
-    loss.scale_px = pixel_tuning_constant(loss.kind) * sigma_ * pixels;
-    return loss;
+    return scaled_for(options_, pattern_, sigma_);
   }
 
   /// Steps until they converge; false where they did not.
@@ -198,11 +186,11 @@ class Refinement {
     summary_.initial_median_grey = statistics.before().median;
     summary_.final_rms_grey = statistics.after().rms;
     summary_.final_median_grey = statistics.after().median;
+    summary_.initial_inlier_share = statistics.before().inliers;
+    summary_.final_inlier_share = statistics.after().inliers;
     summary_.patches_left = statistics.left();
   }
 
-  static constexpr double kSigmaPerMedian = 1.4826022185056018;
-  static constexpr double kLeastSigma = 1;      ///< grey levels: no camera is better
   static constexpr double kFirstScale = 10;     ///< grey levels: while brightness alone is fitted
   static constexpr double kCoarseMotion = 0.1;  ///< pixels of a coarse level
 
@@ -219,7 +207,10 @@ class Refinement {
   PhotometricSummary summary_;
 };
 
-Result<Pattern> check(const PhotometricProblem& problem, const PhotometricOptions& options) {
+}  // namespace
+
+Result<Pattern> check_photometric(const PhotometricProblem& problem,
+                                  const PhotometricOptions& options) {
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   if (Result<void> valid = validate(problem); !valid.ok()) return valid.error();
   const bool rays = uses_rays(problem, options);
@@ -237,21 +228,34 @@ Result<Pattern> check(const PhotometricProblem& problem, const PhotometricOption
                    std::to_string(options.levels));
   if (options.loss.graduated) return usage("graduated losses are not for photometric rows");
   if (!rays) return problem.patch;
+  return make_pattern(options.pattern);
+}
+
+namespace {
+
+Result<void> check_depths(const PhotometricProblem& problem, const PhotometricOptions& options) {
+  if (!uses_rays(problem, options)) return {};
   const PatchState state = state_of(problem, true);
   for (std::size_t i = 0; i < problem.num_points(); ++i)
     if (const double s = state.points[3 * i]; !(s > 0 && std::isfinite(s)))
-      return usage("point " + std::to_string(i) + " is not in front of its host image");
-  return make_pattern(options.pattern);
+      return Error(ErrorCode::usage,
+                   "point " + std::to_string(i) + " is not in front of its host image");
+  return {};
 }
 
 }  // namespace
 
 Result<PhotometricSummary> refine_photometric(PhotometricProblem& problem,
                                               const PhotometricOptions& options) {
-  const Result<Pattern> pattern = check(problem, options);
+  const Result<Pattern> pattern = check_photometric(problem, options);
   if (!pattern.ok()) return pattern.error();
+  if (Result<void> depths = check_depths(problem, options); !depths.ok()) return depths.error();
   try {
-    return Refinement(problem, options, pattern.value()).run();
+    Refinement refinement(problem, options, pattern.value());
+    const std::uint64_t needed = refinement.forecast();
+    if (options.memory_limit_bytes > 0 && needed > options.memory_limit_bytes)
+      return over_memory_limit(needed, options.memory_limit_bytes);
+    return refinement.run();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for these images");
   }

@@ -226,6 +226,16 @@ TEST(ExitCode, OverTheMemoryLimitIsFiveAndNothingIsWritten) {
   EXPECT_NE(refused.err.find("over the limit"), std::string::npos) << refused.err;
   EXPECT_EQ(folder.names(), Words{"in.txt"});
   EXPECT_EQ(run_command({"solve", "in.txt", "--memory-limit", "1G"}, folder.path()).exit_code, 0);
+  run_command({"generate", "images", "--photometric", "--points", "100"}, folder.path());
+  const auto limited = [&](const char* limit) {
+    return run_command({"photometric", "images", "-o", "refined", "--memory-limit", limit},
+                       folder.path());
+  };
+  const Outcome images = limited("1M");
+  EXPECT_EQ(images.exit_code, 5);
+  EXPECT_NE(images.err.find("over the limit"), std::string::npos) << images.err;
+  EXPECT_EQ(folder.names(), (Words{"images", "in.txt"}));
+  EXPECT_EQ(limited("1G").exit_code, 0);
 }
 
 TEST(ExitCode, AFolderWithoutPermissionIsSix) {

@@ -54,7 +54,10 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--depth-tolerance",
                     "--disturb-rotation",
                     "--disturb-center",
-                    "--seed"});
+                    "--seed",
+                    "--ply",
+                    "--pictures",
+                    "--memory-limit"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",

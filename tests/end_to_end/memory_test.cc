@@ -96,5 +96,32 @@ TEST_F(MemoryForecast, HoldsWithALossAndWithPointsHeld) {
   expect_within_a_fifth("iterative-implicit", "mixed", "2", {"--loss", "cauchy:2"});
 }
 
+TEST_F(MemoryForecast, OfImagesIsWithinAFifthOfThePeak) {
+  struct Case {
+    std::vector<std::string> scene, options;
+  };
+  const std::vector<Case> cases = {
+      {{"--points", "2000"}, {}},
+      {{"--points", "20000", "--cameras", "10"}, {"--threads", "1"}},
+      {{"--points", "20000", "--cameras", "4"}, {"--points", "xyz"}},
+      {{"--points", "5000"}, {"--levels", "3", "--pattern", "9x9", "--threads", "2"}}};
+  for (const Case& of : cases) {
+    std::vector<std::string> make = {"generate", "images", "--photometric"};
+    make.insert(make.end(), of.scene.begin(), of.scene.end());
+    ASSERT_EQ(run_command(make, folder_.path()).exit_code, 0);
+    std::vector<std::string> words = {"photometric", "images",           "--json", "out.json",
+                                      "--quiet",     "--max-iterations", "5"};
+    words.insert(words.end(), of.options.begin(), of.options.end());
+    const Outcome outcome = run_command(words, folder_.path());
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const nlohmann::json memory = json_of(folder_ / "out.json")["memory"];
+    const double forecast = memory["forecast_bytes"], peak = memory["peak_bytes"];
+    const std::string what = of.scene[1] + " points: forecast " + std::to_string(forecast) +
+                             ", peak " + std::to_string(peak);
+    EXPECT_LT(forecast, 1.2 * peak) << what;
+    EXPECT_GT(forecast, 0.8 * peak) << what;
+  }
+}
+
 }  // namespace
 }  // namespace sheaf

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "end_to_end/command.h"
@@ -36,6 +38,49 @@ TEST_F(PhotometricCommand, RefinesAndWritesWhatItCanReadAgain) {
   const auto again = json_of(folder_ / "2.json");
   EXPECT_NEAR(again["rms_grey"]["before"], before["rms_grey"]["after"], 0.02);
   EXPECT_EQ(contents_of(folder_ / "refined/3.png"), contents_of(in_scene("3.png")));
+}
+
+std::size_t lines_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// Width and height as a PNG file's header states them, big-endian.
+std::pair<int, int> size_of_png(const std::string& bytes) {
+  const auto number = [&](std::size_t at) {
+    int out = 0;
+    for (std::size_t k = at; k < at + 4; ++k)
+      out = 256 * out + static_cast<unsigned char>(bytes[k]);
+    return out;
+  };
+  return {number(16), number(20)};
+}
+
+TEST_F(PhotometricCommand, WritesPicturesACloudAndWhatIsKnownOfPoints) {
+  const Outcome outcome = run({"photometric", "scene", "-o", "refined", "--pictures", "a/pictures",
+                               "--ply", "cloud.ply", "--json", "1.json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto document = json_of(folder_ / "1.json");
+  EXPECT_EQ(document["pictures"].size(), 8u);
+  for (const std::string name : document["pictures"])
+    EXPECT_EQ(contents_of(folder_ / ("a/pictures/" + name)).rfind("\x89PNG", 0), 0u) << name;
+  // Two panels of 320 x 240 pixels twice as large, with margins and a legend.
+  EXPECT_EQ(size_of_png(contents_of(folder_ / "a/pictures/residuals-5.png")),
+            std::pair(2 * 24 + 2 * 640 + 24, 108 + 480 + 104));
+  const std::string cloud = contents_of(folder_ / "cloud.ply");
+  EXPECT_NE(cloud.find("element vertex 660\n"), std::string::npos) << "2 x (300 + 5 x 6)";
+  EXPECT_EQ(lines_of(contents_of(folder_ / "refined/visibility.txt")), 300u);
+  EXPECT_EQ(lines_of(contents_of(folder_ / "refined/sigma.txt")), 300u);
+  EXPECT_GT(document["sigma"]["median"], 0);
+  EXPECT_EQ(document["sigma"]["of"], "inverse-depth");
+  EXPECT_GT(document["inlier_share"]["after"], document["inlier_share"]["before"]);
+  ASSERT_EQ(run({"photometric", "scene", "--pictures", "again"}).exit_code, 0);
+  EXPECT_EQ(contents_of(folder_ / "again/worst-patches.png"),
+            contents_of(folder_ / "a/pictures/worst-patches.png"));
+  write_text(folder_ / "file", "");
+  const Outcome broken = run({"photometric", "scene", "--pictures", "file"});
+  EXPECT_EQ(broken.exit_code, 6);
+  EXPECT_NE(broken.err.find("file"), std::string::npos) << broken.err;
+  EXPECT_EQ(run({"photometric", "scene", "--ply", "no/cloud.ply"}).exit_code, 6);
 }
 
 TEST_F(PhotometricCommand, OptionsWork) {

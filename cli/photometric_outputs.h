@@ -1,0 +1,44 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "report/patch_comparison.h"
+#include "sheaf/io.h"
+#include "sheaf/photometric.h"
+
+namespace sheaf {
+
+/// What `photometric` writes beside its summary; empty: not asked for.
+struct PhotometricOutputArguments {
+  std::string out, ply, pictures;
+};
+void add_photometric_output_options(CLI::App& verb, PhotometricOutputArguments& arguments);
+
+/// Holds what outputs need of the start until the result is there. Errors are thrown.
+class PhotometricOutputs {
+ public:
+  /// Before anything is computed; makes the folder of the pictures.
+  PhotometricOutputs(const PhotometricOutputArguments& arguments, const std::string& json);
+
+  void remember(const PhotometricProblem& start, const PhotometricOptions& options);
+
+  /// Of the refined problem; the options with the scale that its loss ended with.
+  void write(const PhotometricFolder& folder, const PhotometricDetails& details,
+             const PhotometricOptions& options);
+
+  /// Names of the files in the pictures' folder.
+  const std::vector<std::string>& pictures() const { return pictures_; }
+
+ private:
+  PhotometricOutputArguments arguments_;
+  std::optional<Problem> start_;  ///< for the PLY file
+  std::optional<PatchStage> stage_;
+  std::vector<std::string> pictures_;
+};
+
+}  // namespace sheaf

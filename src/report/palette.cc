@@ -1,0 +1,58 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "report/palette.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "image/canvas.h"
+
+namespace sheaf {
+namespace {
+
+/// Between stops at equal distances; t in [0, 1], what is not a number as 1.
+template <std::size_t kStops>
+Color between(const std::array<Color, kStops>& stops, double t) {
+  const double x = (kStops - 1) * (std::isnan(t) ? 1.0 : std::clamp(t, 0.0, 1.0));
+  const std::size_t i = std::min(kStops - 2, static_cast<std::size_t>(x));
+  const double f = x - static_cast<double>(i);
+  const auto mix = [&](std::uint8_t a, std::uint8_t b) {
+    return static_cast<std::uint8_t>(std::lround((1 - f) * a + f * b));
+  };
+  const Color &a = stops[i], &b = stops[i + 1];
+  return {mix(a.red, b.red), mix(a.green, b.green), mix(a.blue, b.blue)};
+}
+
+}  // namespace
+
+Color grey_shade(double level) {
+  const auto grey = static_cast<std::uint8_t>(std::lround(std::clamp(level, 0.0, 255.0)));
+  return {grey, grey, grey};
+}
+
+Color signed_shade(double t) {
+  constexpr std::array<Color, 5> kStops{
+      {{24, 78, 158}, {120, 170, 214}, {247, 247, 247}, {240, 150, 110}, {178, 24, 43}}};
+  return between(kStops, (1 + t) / 2);
+}
+
+Color size_shade(double t) {
+  constexpr std::array<Color, 5> kStops{
+      {{49, 84, 200}, {116, 190, 225}, {255, 240, 140}, {250, 140, 60}, {190, 10, 40}}};
+  return between(kStops, t);
+}
+
+void draw_colour_bar(Image& image, int x, int y, Color (*shade)(double), double from, double to,
+                     const std::string& low, const std::string& high, const std::string& what) {
+  constexpr int kWidth = 320, kBar = 24, kHeight = 16;
+  draw_text(image, x, y, what, 2, kInk);
+  for (int k = 0; k < kWidth; ++k)
+    fill_rectangle(image, x + k, y + kBar, x + k + 1, y + kBar + kHeight,
+                   shade(from + (to - from) * k / (kWidth - 1)));
+  draw_text(image, x, y + kBar + kHeight + 6, low, 2, kInk);
+  draw_text(image, x + kWidth - text_width(high, 2), y + kBar + kHeight + 6, high, 2, kInk);
+}
+
+}  // namespace sheaf

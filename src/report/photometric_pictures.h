@@ -1,0 +1,21 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "report/patch_comparison.h"
+#include "sheaf/error.h"
+
+namespace sheaf {
+
+/// PNG files in a folder that is there: worst-patches.png and median-patches.png (six points each,
+/// by their rms after), and residuals-J.png for every image J. Returns their names. Errors:
+/// ErrorCode::unwritable_output.
+Result<std::vector<std::string>> write_pictures(const PatchComparison& comparison,
+                                                const std::vector<GreyImage>& images,
+                                                const std::filesystem::path& folder);
+
+}  // namespace sheaf
