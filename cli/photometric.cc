@@ -34,6 +34,9 @@ std::string summary_text(const PhotometricSummary& summary) {
                      summary.final_rms_grey);
   out += fmt::format("median      {:.5g} -> {:.5g} grey levels\n", summary.initial_median_grey,
                      summary.final_median_grey);
+  if (summary.measurements > 0)
+    out += fmt::format("anchor      {} measured positions, rms {:.5g} -> {:.5g} px\n",
+                       summary.measurements, summary.initial_rms_px, summary.final_rms_px);
   out += fmt::format("iterations  {}\n", s.iterations.empty() ? 0 : s.iterations.size() - 1);
   out += fmt::format("stopped     {}\n", s.words);
   out += fmt::format("time        set-up {:.3f} s, solve {:.3f} s; {}, {} thread{}\n", s.setup_s,

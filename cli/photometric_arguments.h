@@ -28,6 +28,9 @@ struct PhotometricArguments {
   double min_zncc = PhotometricOptions().min_zncc;
   int levels = PhotometricOptions().levels;
   int rounds = PhotometricOptions().rounds;
+  std::string rows = "shared";
+  double anchor_px = 0;  ///< 0: none
+  std::string anchor_loss = "none";
   std::string fix;
   double initial_damping = 0;
 };

@@ -84,8 +84,9 @@ struct PhotometricFolder {
 ///   points.txt      a line per point: X Y Z, then the grey levels of its 4x4 patch
 ///   0.png, 1.png    an image per pose
 ///   intrinsics.txt  fx fy cx cy, unless `camera` gives them
-///   hosts.txt       if there: a line per point, the image and pixel x y that its patch is taken
-///   from brightness.txt  if there: a line per image, a b
+///   hosts.txt       if there: a line per point, image and pixel x y that its patch is taken from
+///   brightness.txt  if there: a line per image, a b
+///   measurements.txt  if there: a line per measured position, point image x y
 /// Errors: ErrorCode::unreadable_input, or usage where intrinsics are missing.
 Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
                                            const std::optional<Pinhole>& camera = {});

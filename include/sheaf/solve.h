@@ -99,6 +99,9 @@ struct PhotometricSummary {
   /// and as it became. A patch that left counts as much as it did, and no less than the mean did.
   double initial_rms_grey = 0, final_rms_grey = 0;
   double initial_median_grey = 0, final_median_grey = 0;  ///< of |r|
+  std::uint64_t measurements = 0;  ///< measured positions that the refinement was anchored to
+  double initial_rms_px = 0, final_rms_px = 0;  ///< of their distances
+  double anchor_sigma_grey = 0;  ///< of a pixel, as they were weighed against it in the last round
 };
 
 /// Refines the problem in place. The best state found is stored even when the run was stopped.

@@ -81,6 +81,13 @@ void put_points(const PhotometricProblem& problem, TextBuffer& text) {
   }
 }
 
+void put_measurements(const PhotometricProblem& problem, TextBuffer& text) {
+  for (std::size_t i = 0; i < problem.num_measurements(); ++i) {
+    text.put(problem.measured_point[i], ' '), text.put(problem.measured_image[i], ' ');
+    text.put(problem.measured_xy[2 * i], ' '), text.put(problem.measured_xy[2 * i + 1], '\n');
+  }
+}
+
 }  // namespace
 
 Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path) {
@@ -112,6 +119,11 @@ Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& 
   };
   if (!problem.brightness.empty())
     if (auto r = write_text(path / "brightness.txt", put_brightness); !r.ok()) return r;
+  if (problem.num_measurements() > 0)
+    if (auto r =
+            write_text(path / "measurements.txt", [&](auto& t) { put_measurements(problem, t); });
+        !r.ok())
+      return r;
   for (std::size_t i = 0; i < problem.images.size(); ++i) {
     const fs::path to = path / (std::to_string(i) + ".png");
     if (auto r = folder.files.empty() ? write_image(problem.images[i], to)

@@ -24,12 +24,14 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift", "--photometric",
                     "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
-                    "--occluder", "--start"});
+                    "--occluder", "--start", "--measured"});
   if (verb == "photometric")
-    options.insert({"--output", "--intrinsics", "--interpolation", "--brightness", "--loss",
-                    "--loss-on", "--leaving", "--fix", "--points", "--warp", "--pattern",
-                    "--levels", "--rounds", "--min-zncc", "--max-iterations", "--tolerance",
-                    "--motion", "--time-limit", "--initial-damping"});
+    options.insert({"--output",      "--intrinsics", "--interpolation",   "--brightness",
+                    "--loss",        "--loss-on",    "--leaving",         "--fix",
+                    "--points",      "--warp",       "--pattern",         "--levels",
+                    "--rounds",      "--min-zncc",   "--max-iterations",  "--tolerance",
+                    "--motion",      "--time-limit", "--initial-damping", "--anchor",
+                    "--anchor-loss", "--rows"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
