@@ -36,6 +36,7 @@ Json document_of(const PhotometricSceneOptions& o, const std::string& out, const
             {"occluder", o.occluder},
             {"outliers", o.outliers},
             {"start_px", o.start_px},
+            {"measured_px", o.measured_px < 0 ? Json() : Json(o.measured_px)},
             {"seed", o.seed}}},
           {"output", out},
           {"truth", truth.empty() ? Json() : Json(truth)},
@@ -79,6 +80,12 @@ void add_photometric_scene_options(CLI::App& verb, PhotometricSceneArguments& a)
   number("--start", "PX", o.start_px, 100,
          "median distance of patches from their place at the start",
          "a number of pixels from 0 to 100");
+  verb.add_option("--measured", o.measured_px,
+                  "write measurements.txt too, where points are seen plus noise of this size, for "
+                  "`sheaf photometric --anchor`")
+      ->type_name("SIGMA_PX")
+      ->check(number_in(0, 100, true, "a number of pixels from 0 to 100"))
+      ->needs(flag);
   for (const char* name : {"--like", "--family", "--drift", "--mean-track", "--pixel-noise",
                            "--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
     flag->excludes(verb.get_option(name));

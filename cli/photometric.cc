@@ -40,6 +40,9 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
   out += fmt::format("sigma       a pixel {:.3g} grey levels, {} {:.3g} (median)\n",
                      details.sigma_grey, details.of_inverse_depth ? "an inverse depth" : "a point",
                      median_sigma(details));
+  if (summary.measurements > 0)
+    out += fmt::format("anchor      {} measured positions, rms {:.5g} -> {:.5g} px\n",
+                       summary.measurements, summary.initial_rms_px, summary.final_rms_px);
   out += fmt::format("iterations  {}\n", s.iterations.empty() ? 0 : s.iterations.size() - 1);
   out += fmt::format("stopped     {}\n", s.words);
   out +=

@@ -24,6 +24,14 @@ const std::map<std::string, Parametrisation> kParametrisations = {
     {"xyz", Parametrisation::xyz},
     {"inverse-depth", Parametrisation::inverse_depth}};
 
+/// A loss of measured positions: its scale is in their standard deviations.
+std::string parse_anchor_loss(const std::string& text, Loss& out) {
+  if (std::string wrong = parse_loss(text, out); !wrong.empty()) return wrong;
+  if (out.graduated || (out.kind != LossKind::none && out.scale_px == kAutomaticScale))
+    return "expected a loss with a :SCALE in standard deviations, not '" + text + "'";
+  return "";
+}
+
 void add_model_options(CLI::App& verb, PhotometricArguments& a) {
   verb.add_option("--interpolation", a.interpolation,
                   "bicubic (Catmull-Rom, exact slopes), bilinear (slopes are central differences) "
@@ -100,6 +108,28 @@ void add_patch_options(CLI::App& verb, PhotometricArguments& a) {
       ->capture_default_str();
 }
 
+void add_anchor_options(CLI::App& verb, PhotometricArguments& a) {
+  CLI::Option* anchor =
+      verb.add_option("--anchor", a.anchor_px,
+                      "standard deviation of the positions in measurements.txt: they become rows "
+                      "beside the patches; not given: they do not count")
+          ->type_name("SIGMA_PX")
+          ->check(number_in(0, std::numeric_limits<double>::infinity(), false,
+                            "a number of pixels above 0"));
+  verb.add_option("--anchor-loss", a.anchor_loss,
+                  "of measured positions: none, or as --loss with a scale in standard deviations")
+      ->type_name("NAME[:SCALE]")
+      ->check(parsed_by<Loss>(parse_anchor_loss))
+      ->capture_default_str()
+      ->needs(anchor);
+  verb.add_option("--rows", a.rows,
+                  "shared (the pixels of a warped patch share the derivatives of its middle) or "
+                  "exact (each has its own; several times slower)")
+      ->type_name("NAME")
+      ->check(one_of({"shared", "exact"}))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
@@ -108,6 +138,7 @@ void add_photometric_options(CLI::App& verb, PhotometricArguments& a) {
   add_photometric_input_options(verb, a.input);
   add_model_options(verb, a);
   add_patch_options(verb, a);
+  add_anchor_options(verb, a);
   verb.add_option("--max-iterations", a.max_iterations, "steps to try, rejected ones included")
       ->type_name("N")
       ->check(whole_number_from(0, "a whole number from 0 up"))
@@ -157,6 +188,9 @@ PhotometricOptions photometric_options(const PhotometricArguments& a) {
   options.rounds = a.rounds;
   options.fix_poses = a.fix == "poses";
   options.fix_points = a.fix == "points";
+  options.rows = a.rows == "exact" ? PatchRows::exact : PatchRows::shared;
+  if (a.anchor_px > 0) options.anchor_px = a.anchor_px;
+  parse_anchor_loss(a.anchor_loss, options.anchor_loss);
   options.initial_damping = a.initial_damping;
   return options;
 }

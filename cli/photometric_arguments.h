@@ -30,6 +30,9 @@ struct PhotometricArguments {
   double min_zncc = PhotometricOptions().min_zncc;
   int levels = PhotometricOptions().levels;
   int rounds = PhotometricOptions().rounds;
+  std::string rows = "shared";
+  double anchor_px = 0;  ///< 0: none
+  std::string anchor_loss = "none";
   std::string fix;
   std::uint64_t memory_limit_bytes = 0;  ///< none
   double initial_damping = 0;

@@ -66,7 +66,12 @@ struct PhotometricProblem {
   /// Patches that may count, those of a point in ascending order of images: what is known to be
   /// hidden is left out. Empty: every point in every image but its host.
   std::vector<std::uint32_t> sight_point, sight_image;
+  /// Positions of points in images that were measured by other means, in any order, or none: what a
+  /// refinement can be anchored to (PhotometricOptions::anchor_px).
+  std::vector<std::uint32_t> measured_point, measured_image;
+  std::vector<double> measured_xy;  ///< 2 for each, pixels
 
+  std::size_t num_measurements() const { return measured_point.size(); }
   std::size_t num_points() const { return points.size() / 3; }
   bool has_hosts() const { return !host.empty(); }
 };
@@ -112,6 +117,12 @@ enum class Leaving {
   free,       ///< costs nothing, and any patch may come in at any time (compatibility)
 };
 
+/// How the pixels of a patch that is warped by inverse depth enter a step. The cost is the same.
+enum class PatchRows {
+  shared,  ///< with the derivatives of the patch's middle: two rows a patch
+  exact,   ///< each with its own: six rows a patch, by plain code, several times slower
+};
+
 struct PhotometricOptions {
   int max_iterations = 100;  ///< trust region steps tried, rejected ones included, over all levels
   double tolerance = 1e-6;   ///< stop when the relative cost decrease stays below this twice ...
@@ -130,6 +141,13 @@ struct PhotometricOptions {
   Leaving leaving = Leaving::truncated;
   int levels = 1;  ///< of the pyramid
   bool fix_poses = false, fix_points = false;
+  PatchRows rows = PatchRows::shared;
+  /// Standard deviation of the problem's measured positions, pixels of the full image. They cost
+  ///   sigma^2 / 2 sum rho(|u - measured|^2 / anchor_px^2)
+  /// beside the patches, sigma being a pixel's standard deviation in grey levels, estimated anew at
+  /// each round's start (1.4826 x the median |r|, at least 1). Infinite: they cost nothing.
+  double anchor_px = std::numeric_limits<double>::infinity();
+  Loss anchor_loss{};          ///< of measured positions; its scale is in standard deviations
   double initial_damping = 0;  ///< 0: the default rule
   int threads = 0;             ///< 0: all; the result does not depend on it
   double time_limit_s = std::numeric_limits<double>::infinity();
@@ -172,6 +190,7 @@ struct PhotometricSceneOptions {
   bool occluder = false;      ///< a square that hides part of the surface and has no points
   double outliers = 0;        ///< fraction of points that start at a depth that is wrong by half
   double start_px = 1;        ///< median distance of patches from their place at the start
+  double measured_px = -1;    ///< noise of points' measured positions; below 0: none are measured
   std::uint64_t seed = 1;
 };
 

@@ -100,6 +100,9 @@ struct PhotometricSummary {
   double initial_rms_grey = 0, final_rms_grey = 0;
   double initial_median_grey = 0, final_median_grey = 0;    ///< of |r|
   double initial_inlier_share = 0, final_inlier_share = 0;  ///< |r| of at most 10 grey levels
+  std::uint64_t measurements = 0;  ///< measured positions that the refinement was anchored to
+  double initial_rms_px = 0, final_rms_px = 0;  ///< of their distances
+  double anchor_sigma_grey = 0;  ///< of a pixel, as they were weighed against it in the last round
 };
 
 /// Refines the problem in place. The best state found is stored even when the run was stopped.

@@ -18,8 +18,11 @@ namespace sheaf {
 ///   poses   a line per image: time, cam_from_world translation, quaternion x y z w
 ///   points  a line per point: X Y Z, then 16 grey levels, dx in -2..1 outside, dy in -2..1 inside
 /// and those that may be beside them:
-///   hosts       a line per point: image, x and y of its pixel; the 16 grey levels are then not
-///   used brightness  a line per image: a b intrinsics  fx fy cx cy
+///   hosts         a line per point: image, x and y of its pixel; the 16 grey levels are then not
+///                 used
+///   brightness    a line per image: a b
+///   intrinsics    fx fy cx cy
+///   measurements  a line per measured position: point, image, x, y
 Result<void> parse_direct_poses(std::string_view text, const std::string& name,
                                 PhotometricFolder& folder);
 Result<void> parse_direct_points(std::string_view text, const std::string& name,
@@ -29,6 +32,8 @@ Result<void> parse_direct_hosts(std::string_view text, const std::string& name,
                                 PhotometricFolder& folder);
 Result<void> parse_direct_brightness(std::string_view text, const std::string& name,
                                      PhotometricFolder& folder);
+Result<void> parse_direct_measurements(std::string_view text, const std::string& name,
+                                       PhotometricFolder& folder);
 Result<void> parse_direct_intrinsics(std::string_view text, const std::string& name,
                                      PhotometricFolder& folder);
 

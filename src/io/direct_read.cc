@@ -54,7 +54,8 @@ Result<PhotometricFolder> read_direct(const FolderFiles& files,
                                     {"points.txt", parse_direct_points}})
     if (auto read = read_text(files, name, parse, folder); !read.ok()) return read.error();
   for (const auto& [name, parse] : {std::pair<const char*, Parse>{"hosts.txt", parse_direct_hosts},
-                                    {"brightness.txt", parse_direct_brightness}})
+                                    {"brightness.txt", parse_direct_brightness},
+                                    {"measurements.txt", parse_direct_measurements}})
     if (files.has(name))
       if (auto read = read_text(files, name, parse, folder); !read.ok()) return read.error();
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
@@ -141,6 +142,35 @@ Result<void> parse_direct_brightness(std::string_view text, const std::string& n
     folder.problem.brightness.push_back({ab[0], ab[1]});
   }
   if (!in.at_end()) return in.unexpected("the end of the file behind the last image's brightness");
+  return {};
+}
+
+Result<void> parse_direct_measurements(std::string_view text, const std::string& name,
+                                       PhotometricFolder& folder) {
+  Result<ByteSource> source = ByteSource::open(RawBytes(text, name));
+  if (!source.ok()) return source.error();
+  TokenReader in(source.value());
+  PhotometricProblem& problem = folder.problem;
+  const auto read_index = [&](std::size_t count, const char* what) -> Result<std::uint32_t> {
+    std::uint64_t index = 0;
+    if (in.read_integer(index) && index < count) return static_cast<std::uint32_t>(index);
+    return in.unexpected(std::string("the ") + what + " of measured position " +
+                         std::to_string(problem.num_measurements()) + ", 0 to " +
+                         std::to_string(count - 1));
+  };
+  while (!in.at_end()) {
+    const Result<std::uint32_t> point = read_index(problem.num_points(), "point");
+    if (!point.ok()) return point.error();
+    const Result<std::uint32_t> image = read_index(problem.poses.size(), "image");
+    if (!image.ok()) return image.error();
+    std::array<double, 2> xy;
+    if (auto e =
+            read_reals(in, xy.data(), xy.size(), "measured position", problem.num_measurements()))
+      return *e;
+    problem.measured_point.push_back(point.value());
+    problem.measured_image.push_back(image.value());
+    problem.measured_xy.insert(problem.measured_xy.end(), xy.begin(), xy.end());
+  }
   return {};
 }
 

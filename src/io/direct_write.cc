@@ -55,6 +55,13 @@ void put_points(const PhotometricProblem& problem, TextBuffer& text) {
   }
 }
 
+void put_measurements(const PhotometricProblem& problem, TextBuffer& text) {
+  for (std::size_t i = 0; i < problem.num_measurements(); ++i) {
+    text.put(problem.measured_point[i], ' '), text.put(problem.measured_image[i], ' ');
+    text.put(problem.measured_xy[2 * i], ' '), text.put(problem.measured_xy[2 * i + 1], '\n');
+  }
+}
+
 }  // namespace
 
 Result<void> write_looks(const PhotometricProblem& problem, const fs::path& path) {
@@ -86,6 +93,11 @@ Result<void> write_direct(const PhotometricFolder& folder, const fs::path& path)
   if (problem.has_hosts())
     if (auto r = write_text_file(path / "hosts.txt", put_hosts); !r.ok()) return r;
   if (auto r = write_looks(problem, path); !r.ok()) return r;
+  if (problem.num_measurements() > 0)
+    if (auto r = write_text_file(path / "measurements.txt",
+                                 [&](TextBuffer& text) { put_measurements(problem, text); });
+        !r.ok())
+      return r;
   for (std::size_t i = 0; i < problem.images.size(); ++i) {
     const fs::path to = path / (std::to_string(i) + ".png");
     if (auto r = folder.files.empty() ? write_image(problem.images[i], to)

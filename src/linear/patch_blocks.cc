@@ -52,6 +52,17 @@ void add_block(double* block, const std::array<double, 64>& M, double sign, bool
     }
 }
 
+/// What the squares lack where a point has several rows in one block: (T_a + T_b)^2 is more than
+/// T_a^2 + T_b^2.
+void add_repeated_squares(const PatchBlocks::Maps& maps, const PatchBlocks::Map& P, double* target,
+                          double* host) {
+  for (int k = 0; k < 8; ++k)
+    for (int i = 0; i < 8; ++i) {
+      target[k] += 2 * maps.target[8 * i + k] * maps.target[8 * i + k] * P[9 * i];
+      host[k] += 2 * maps.host[8 * i + k] * maps.host[8 * i + k] * P[9 * i];
+    }
+}
+
 }  // namespace
 
 PatchBlocks::PatchBlocks(const PatchScene& scene, const std::vector<Sight>& sights)
@@ -171,6 +182,7 @@ void PatchBlocks::fold(const Poses& poses, const std::vector<Brightness>& bright
     take(targets_[p], hosts_[q], sandwich(maps[p].target, P, maps[q].host), 1);
     take(hosts_[p], targets_[q], sandwich(maps[p].host, P, maps[q].target), 1);
     take(hosts_[p], hosts_[q], sandwich(maps[p].host, P, maps[q].host), 1);
+    if (p == q) add_repeated_squares(maps[p], P, block(targets_[p]) + 80, block(hosts_[p]) + 80);
   }
 }
 

@@ -22,6 +22,11 @@ namespace sheaf {
 ///   b)_host].
 class PatchBlocks {
  public:
+  using Map = std::array<double, 64>;  ///< 8 x 8, row-major
+  struct Maps {
+    Map target, host;  ///< Y, Z
+  };
+
   /// Of these sights, whose blocks are numbered in the order of (target, host).
   PatchBlocks(const PatchScene& scene, const std::vector<Sight>& sights);
 
@@ -54,10 +59,6 @@ class PatchBlocks {
             const double* image_steps, double* block_steps) const;
 
  private:
-  using Map = std::array<double, 64>;  ///< 8 x 8, row-major
-  struct Maps {
-    Map target, host;  ///< Y, Z
-  };
   Maps maps_of(std::size_t block, const Poses& poses,
                const std::vector<Brightness>& brightness) const;
 

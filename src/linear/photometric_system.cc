@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "linear/plan.h"
 #include "linear/slices.h"
+#include "residual/exact_patches.h"
 
 namespace sheaf {
 
@@ -44,6 +46,20 @@ Chunks only_tiles(std::vector<Tile> tiles) {
   return out;
 }
 
+/// What blocks are made of.
+std::vector<Sight> with_measured(std::vector<Sight> sights, const Anchor& anchor) {
+  for (const Measurement& of : anchor.measurements) sights.push_back({of.point, of.image});
+  return sights;
+}
+
+std::unique_ptr<MixedRows> mix_rows(const PatchScene& scene, const PatchBlocks& blocks,
+                                    const Batches& patches, bool exact, const Anchor& anchor,
+                                    std::size_t points, int lanes) {
+  const int pairs = exact && scene.warped ? kExactPairs : 1;
+  if (pairs == 1 && anchor.measurements.empty()) return nullptr;
+  return std::make_unique<MixedRows>(scene, blocks, patches, pairs, anchor, points, lanes);
+}
+
 double norm3(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 }  // namespace
@@ -51,25 +67,29 @@ double norm3(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2
 PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& state,
                                      const std::vector<Sight>& sights,
                                      const PhotometricRules& rules, const Kernels& kernels,
-                                     Threads& threads)
+                                     Threads& threads, Anchor anchor)
     : scene_(scene),
       rules_(rules),
       kernels_(kernels),
       row_kernels_(row_kernels(kernels.name)),
       patch_kernels_(photometric_kernels(kernels.name)),
       threads_(threads),
-      blocks_(scene, sights),
+      anchor_(std::move(anchor)),
+      blocks_(scene, with_measured(sights, anchor_)),
       batches_(arrange_sights(scene, blocks_, sights, state.points.size() / 3)),
-      chunks_(cut_into_chunks(batches_, blocks_.count(),
+      mixed_(mix_rows(scene, blocks_, batches_, rules.exact_rows, anchor_, state.points.size() / 3,
+                      row_kernels_.lanes)),
+      chunks_(cut_into_chunks(rows(), blocks_.count(),
                               rules.points_held ? ChunkLists::diagonal : ChunkLists::pairs)),
       image_chunks_(
           only_tiles(blocks_.are_pairs() ? blocks_.image_tiles(chunks_.tiles) : chunks_.tiles)),
       columns_(number_columns(scene.num_images(), rules)),
       initial_points_(state.points),
       stage_(columns_) {
+  if (mixed_) patch_chunks_ = cut_into_chunks(batches_, blocks_.count(), ChunkLists::none);
   fill_state(state);
   const std::size_t slices = chunks_.slices.size() - 1, images = scene.num_images();
-  factors_.allocate(kFactorGroup * batches_.groups.size());
+  factors_.allocate(kFactorGroup * rows().groups.size());
   tiles_.allocate(slices * kTileDoubles * chunks_.tiles.size());
   diagonal_.allocate(slices * kDiagonalDoubles * blocks_.count());
   image_steps_.allocate(kStepRecord * images);
@@ -95,8 +115,13 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
 
 void PhotometricSystem::allocate(Half& half) const {
   half.views.allocate(kViewRecord * blocks_.count());
-  half.points.allocate(kPointGroup * batches_.groups.size());
-  half.rows.allocate(kRowBatch * batches_.num_batches());
+  half.points.allocate(kPointGroup * rows().groups.size());
+  half.rows.allocate(kRowBatch * rows().num_batches());
+  if (mixed_) {
+    const std::size_t pairs = rules_.exact_rows && scene_.warped ? kExactPairs : 1;
+    half.patch_points.allocate(kPointGroup * batches_.groups.size());
+    half.patch_rows.allocate(kRowBatch * pairs * batches_.num_batches());
+  }
   half.brightness_sums.allocate(rules_.brightness ? kBrightnessBatch * batches_.num_batches() : 0);
   half.seen.allocate(16 * batches_.num_batches());
   half.costs.allocate(16 * batches_.num_batches());
@@ -109,25 +134,38 @@ void PhotometricSystem::fill_state(const PatchState& state) {
   tried_.brightness = held_.brightness;
   allocate(held_);
   allocate(tried_);
-  if (scene_.has_rays()) rays_.allocate(held_.points.size());
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (int l = 0; l < 8; ++l) {
-      const std::size_t point = 3 * std::size_t(batches_.lane_point[8 * g + l]);
-      for (int d = 0; d < 3; ++d) {
-        held_.points[kPointGroup * g + 8 * d + l] = state.points[point + d];
-        if (scene_.has_rays()) rays_[kPointGroup * g + 8 * d + l] = scene_.rays[point + d];
-      }
-    }
+  const auto spread = [](const Batches& batches, const std::vector<double>& from, double* to) {
+    for (std::size_t g = 0; g < batches.groups.size(); ++g)
+      for (int l = 0; l < 8; ++l)
+        for (int d = 0; d < 3; ++d)
+          to[kPointGroup * g + 8 * d + l] =
+              from[3 * std::size_t(batches.lane_point[8 * g + l]) + d];
+  };
+  spread(rows(), state.points, held_.points.data());
+  if (scene_.has_rays()) {
+    rays_.allocate(kPointGroup * batches_.groups.size());
+    spread(batches_, scene_.rays, rays_.data());
+  }
   blocks_.write_views(held_.poses, held_.brightness, held_.views.data());
 }
 
-/// Chunks write what is theirs; their costs are added in order.
 PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
+  if (mixed_) mixed_->spread_points(batches_, half.points.data(), half.patch_points.data());
+  Totals totals = collapse_patches(half);
+  if (mixed_) gather_rows(half, totals);
+  totals.cost += prior_cost(half);
+  return totals;
+}
+
+/// Chunks write what is theirs; their costs are added in order.
+PhotometricSystem::Totals PhotometricSystem::collapse_patches(Half& half) {
+  const bool exact = rules_.exact_rows && scene_.warped;
+  const Chunks& chunks = patch_chunks();
   const PhotometricInput in{&batches_,
                             scene_.planes.data(),
                             blocks_.targets().data(),
                             half.views.data(),
-                            half.points.data(),
+                            mixed_ ? half.patch_points.data() : half.points.data(),
                             scene_.has_rays() ? rays_.data() : nullptr,
                             scene_.references.data(),
                             &scene_.grid,
@@ -139,11 +177,15 @@ PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
                             rules_.brightness,
                             scene_.warped};
   std::vector<PhotometricOutput> outputs(
-      chunks_.chunks.size(), {half.rows.data(), half.brightness_sums.data(), half.seen.data(),
-                              half.costs.data(), 0, 0, 0});
+      chunks.chunks.size(),
+      {mixed_ ? half.patch_rows.data() : half.rows.data(), half.brightness_sums.data(),
+       half.seen.data(), half.costs.data(), 0, 0, 0});
   threads_.for_each(outputs.size(), [&](std::size_t c) {
-    patch_kernels_.collapse(in, chunks_.chunks[c].first_group, chunks_.chunks[c].end_group,
-                            outputs[c]);
+    const Chunk& chunk = chunks.chunks[c];
+    if (exact)
+      collapse_exactly(in, row_kernels_.lanes, chunk.first_group, chunk.end_group, outputs[c]);
+    else
+      patch_kernels_.collapse(in, chunk.first_group, chunk.end_group, outputs[c]);
   });
   Totals totals;
   for (const PhotometricOutput& out : outputs) {
@@ -151,8 +193,21 @@ PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
     totals.square_sum += out.square_sum;
     totals.left += out.left;
   }
-  totals.cost += prior_cost(half);
   return totals;
+}
+
+/// The patches' rows to where elimination takes them, and the measurements' rows and costs.
+void PhotometricSystem::gather_rows(Half& half, Totals& totals) const {
+  const MixedRows::State state{half.views.data(), half.points.data(), half.patch_rows.data()};
+  std::vector<MixedRows::Totals> measured(chunks_.chunks.size());
+  threads_.for_each(measured.size(), [&](std::size_t c) {
+    const Chunk& chunk = chunks_.chunks[c];
+    measured[c] = mixed_->gather(state, chunk.first_group, chunk.end_group, half.rows.data());
+  });
+  for (const MixedRows::Totals& of : measured) {
+    totals.cost += of.cost;
+    totals.square_sum += of.square_sum;
+  }
 }
 
 /// Collapses the held state under this loss, unless that is what its rows are.
@@ -234,10 +289,10 @@ void PhotometricSystem::eliminate(double damping, std::vector<EliminateOutput>& 
   const std::size_t slices = outputs.size();
   const std::size_t tile_doubles = tiles_.size() / slices;
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
-  const StoredRowsInput in{&batches_, held_.rows.data(), damping, rules_.points_held};
+  const StoredRowsInput in{&rows(), held_.rows.data(), damping, rules_.points_held};
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
-    if (scratch.size() == 0) scratch.allocate(scratch_doubles(batches_, chunks_));
+    if (scratch.size() == 0) scratch.allocate(scratch_doubles(rows(), chunks_));
     const Records records = records_in(scratch.data(), chunks_);
     double* tiles = tiles_.data() + s * tile_doubles;
     double* diagonal = diagonal_.data() + s * diagonal_doubles;
@@ -247,13 +302,15 @@ void PhotometricSystem::eliminate(double damping, std::vector<EliminateOutput>& 
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
       const Chunk& chunk = chunks_.chunks[c];
       row_kernels_.eliminate(in, chunk, records, outputs[s]);
-      kernels_.diagonal(batches_, chunks_, chunk, records, diagonal);
+      kernels_.diagonal(rows(), chunks_, chunk, records, diagonal);
       kernels_.pairs(chunks_, chunk, records, tiles);
-      if (rules_.brightness) add_brightness(chunk, diagonal);
+      if (rules_.brightness && !mixed_) add_brightness(chunk, diagonal);
     }
   });
   add_slices(tiles_, slices, threads_);
   add_slices(diagonal_, slices, threads_);
+  if (rules_.brightness && mixed_)
+    for (const Chunk& chunk : patch_chunks_.chunks) add_brightness(chunk, diagonal_.data());
 }
 
 void PhotometricSystem::fold_to_images() {
@@ -311,7 +368,7 @@ double PhotometricSystem::step_cameras() {
 Trial PhotometricSystem::trial() {
   Trial out;
   out.step_norm = step_cameras();
-  const RowTrialInput in{&batches_, held_.rows.data(), steps_.data(), held_.points.data(),
+  const RowTrialInput in{&rows(), held_.rows.data(), steps_.data(), held_.points.data(),
                          factors_.data()};
   std::vector<TrialOutput> outputs(chunks_.chunks.size(),
                                    TrialOutput{tried_.points.data(), 0, 0, 0, 0});
@@ -383,10 +440,10 @@ PatchState PhotometricSystem::state() const {
     out.poses.push_back({pose.rotation, pose.translation});
   out.brightness = held_.brightness;
   out.points = initial_points_;
-  for (std::size_t g = 0; g < batches_.groups.size(); ++g)
-    for (std::uint32_t l = 0; l < batches_.groups[g].lanes; ++l)
+  for (std::size_t g = 0; g < rows().groups.size(); ++g)
+    for (std::uint32_t l = 0; l < rows().groups[g].lanes; ++l)
       for (int d = 0; d < 3; ++d)
-        out.points[3 * std::size_t(batches_.lane_point[8 * g + l]) + d] =
+        out.points[3 * std::size_t(rows().lane_point[8 * g + l]) + d] =
             held_.points[kPointGroup * g + 8 * d + l];
   return out;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "geometry/rigid_motion.h"
@@ -9,11 +10,13 @@
 #include "linear/chunks.h"
 #include "linear/columns.h"
 #include "linear/kernels.h"
+#include "linear/mixed_rows.h"
 #include "linear/patch_blocks.h"
 #include "linear/row_kernels.h"
 #include "linear/system.h"
 #include "platform/buffer.h"
 #include "platform/parallel.h"
+#include "residual/anchor.h"
 #include "residual/photometric.h"
 
 namespace sheaf {
@@ -25,6 +28,7 @@ struct PhotometricRules {
   double prior_a = 1, prior_b = 100;   ///< standard deviations of the priors a = 1, b = 0
   bool loss_per_patch = false;
   bool leaving_is_free = false;
+  bool exact_rows = false;  ///< where patches are warped
 };
 
 /// Photometric rows on CPU threads: patches collapse to two rows each, which are stored; from there
@@ -36,10 +40,11 @@ class PhotometricSystem : public System {
   static constexpr std::int32_t kMostDenseColumns = 1200;
 
   /// Throws std::bad_alloc. The sights are the patches that count, in any order; those that are not
-  /// in their image when a loss is first used count as having left.
+  /// in their image when a loss is first used count as having left. Measured positions have to be
+  /// those of points in front of their cameras.
   PhotometricSystem(const PatchScene& scene, const PatchState& state,
                     const std::vector<Sight>& sights, const PhotometricRules& rules,
-                    const Kernels& kernels, Threads& threads);
+                    const Kernels& kernels, Threads& threads, Anchor anchor = {});
 
   Step propose(const StepRequest& request) override;
   Trial trial() override;
@@ -57,6 +62,7 @@ class PhotometricSystem : public System {
     std::vector<RigidMotion<double>> poses;
     std::vector<Brightness> brightness;
     Buffer<double> views, points, rows, brightness_sums, seen, costs;
+    Buffer<double> patch_points, patch_rows;  ///< in the patches' arrangement where that differs
   };
   struct Totals {
     double cost = 0, square_sum = 0;
@@ -66,9 +72,14 @@ class PhotometricSystem : public System {
   void fill_state(const PatchState& state);
   void allocate(Half& half) const;
   Totals collapse(Half& half);
+  Totals collapse_patches(Half& half);
+  void gather_rows(Half& half, Totals& totals) const;
   void hold(const ScaledLoss& loss);
   void set_leaving();
   void add_brightness(const Chunk& chunk, double* diagonal) const;
+  /// How the rows are arranged, and how the patches are.
+  const Batches& rows() const { return mixed_ ? mixed_->batches() : batches_; }
+  const Chunks& patch_chunks() const { return mixed_ ? patch_chunks_ : chunks_; }
   void add_priors();
   double prior_cost(const Half& half) const;
   void eliminate(double damping, std::vector<EliminateOutput>& outputs);
@@ -86,10 +97,13 @@ class PhotometricSystem : public System {
   const RowKernels& row_kernels_;
   const PhotometricKernels& patch_kernels_;
   Threads& threads_;
+  const Anchor anchor_;
   PatchBlocks blocks_;
-  Batches batches_;  ///< what these call an image is a block
-  Chunks chunks_;
-  Chunks image_chunks_;  ///< tiles of images alone: what the camera solver sees
+  Batches batches_;                   ///< of the patches; what these call an image is a block
+  std::unique_ptr<MixedRows> mixed_;  ///< null: every patch is one observation, and all there is
+  Chunks chunks_;                     ///< of the rows
+  Chunks patch_chunks_;               ///< empty where the patches' are the rows'
+  Chunks image_chunks_;               ///< tiles of images alone: what the camera solver sees
   Columns columns_;
   std::vector<double> initial_points_;  ///< of points that no patch sees
 

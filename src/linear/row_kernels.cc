@@ -108,7 +108,9 @@ void back_substitute_rows(const RowTrialInput& in, const Chunk& chunk, TrialOutp
   out.step2_max = most > out.step2_max ? most : out.step2_max;
 }
 
-RowKernels row_table(const char* name) { return {name, &eliminate_rows, &back_substitute_rows}; }
+RowKernels row_table(const char* name) {
+  return {name, kLanes, &eliminate_rows, &back_substitute_rows};
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sheaf

@@ -32,6 +32,7 @@ struct RowTrialInput {
 /// that of reprojection from where the rows are known.
 struct RowKernels {
   const char* name;
+  int lanes;  ///< of a part: what the rows' places depend on (residual/row_layout.h)
   /// As Kernels::linearize from there on: factors the points and writes the records; adds to
   /// out.point_decrease and out.gradient_max2.
   void (*eliminate)(const StoredRowsInput&, const Chunk&, const Records&, EliminateOutput& out);

@@ -95,6 +95,18 @@ Result<void> check_references(const PhotometricProblem& p) {
   return {};
 }
 
+Result<void> check_measurements(const PhotometricProblem& p) {
+  const std::size_t count = p.num_measurements();
+  if (p.measured_image.size() != count || p.measured_xy.size() != 2 * count)
+    return wrong("measured positions are not one point, one image and one pixel each");
+  for (std::size_t i = 0; i < count; ++i)
+    if (p.measured_point[i] >= p.num_points() || p.measured_image[i] >= p.images.size() ||
+        !all_finite(&p.measured_xy[2 * i], 2))
+      return wrong(entry("measured position", i) +
+                   ": no such point, no such image, or a pixel that is not finite");
+  return {};
+}
+
 }  // namespace
 
 std::vector<std::string> pattern_names() {
@@ -134,7 +146,8 @@ Result<Pattern> make_pattern(const std::string& name) {
 
 Result<void> validate(const PhotometricProblem& problem) {
   if (Result<void> images = check_images(problem); !images.ok()) return images;
-  return check_references(problem);
+  if (Result<void> points = check_references(problem); !points.ok()) return points;
+  return check_measurements(problem);
 }
 
 }  // namespace sheaf

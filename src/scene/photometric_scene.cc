@@ -18,7 +18,16 @@ constexpr double kSpread = 0.4;  ///< radius of the circle that the cameras stan
 constexpr double kRoll_rad = 0.05;
 constexpr int kMargin_px = 12;  ///< hosts' pixels keep away from the border
 /// Streams of the seed.
-enum Stream : std::uint64_t { kWaves, kPoses, kPlaces, kNoise, kBrightness, kStart, kOutliers };
+enum Stream : std::uint64_t {
+  kWaves,
+  kPoses,
+  kPlaces,
+  kNoise,
+  kBrightness,
+  kStart,
+  kOutliers,
+  kMeasured
+};
 
 Vector3<double> unit(const Vector3<double>& v) {
   const double n = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -122,6 +131,28 @@ void store_patches(PhotometricProblem& truth) {
   }
 }
 
+/// Where the truth sees points, hosts included, plus noise; inside the images only.
+void measure_points(const PhotometricSceneOptions& options, const std::vector<Lens>& lenses,
+                    PhotometricProblem& truth) {
+  if (options.measured_px < 0) return;
+  Random random(options.seed, kMeasured);
+  const Pinhole& k = truth.camera;
+  for (std::uint32_t i = 0; i < truth.num_points(); ++i)
+    for (std::uint32_t j = 0; j < lenses.size(); ++j) {
+      const double* X = &truth.points[3 * std::size_t(i)];
+      const Vector3<double> P = multiply(lenses[j].R, Vector3<double>{X[0], X[1], X[2]});
+      const Vector3<double>& t = lenses[j].pose.translation;
+      const double z = P[2] + t[2];
+      const double x = k.fx * (P[0] + t[0]) / z + k.cx, y = k.fy * (P[1] + t[1]) / z + k.cy;
+      if (!(z > 0 && x >= 0 && y >= 0 && x <= options.width - 1 && y <= options.height - 1))
+        continue;
+      truth.measured_point.push_back(i);
+      truth.measured_image.push_back(j);
+      truth.measured_xy.push_back(x + options.measured_px * random.normal());
+      truth.measured_xy.push_back(y + options.measured_px * random.normal());
+    }
+}
+
 /// Poses and depths that are off by `size` times what moves a patch by about a pixel.
 PhotometricProblem disturbed(const PhotometricSceneOptions& options,
                              const PhotometricProblem& truth, double size) {
@@ -186,6 +217,7 @@ Result<void> check(const PhotometricSceneOptions& o) {
   if (!(o.brightness >= 0 && o.brightness <= 0.5)) return usage("the brightness is 0 to 0.5");
   if (!(o.noise_grey >= 0 && std::isfinite(o.noise_grey)))
     return usage("the noise is negative or not finite");
+  if (!std::isfinite(o.measured_px)) return usage("the noise of measured positions is not finite");
   if (!(o.start_px >= 0 && o.start_px <= 100)) return usage("the start is 0 to 100 pixels away");
   return {};
 }
@@ -211,6 +243,7 @@ Result<PhotometricScene> generate(const PhotometricSceneOptions& options) {
     truth.images.push_back(render(options, surface, lenses[i], truth.brightness[i], noise));
   }
   store_patches(truth);
+  measure_points(options, lenses, truth);
   const double unit_px = median_offset(disturbed(options, truth, 1e-3), truth);
   scene.start = disturbed(options, truth, options.start_px * 1e-3 / unit_px);
   scene.start.images = truth.images;

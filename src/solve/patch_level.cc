@@ -22,9 +22,6 @@ Taps taps_of(Interpolation interpolation) {
   return Taps::catmull_rom;
 }
 
-/// Pixel (x, y) of a level is at (2 x + 1/2, 2 y + 1/2) of the next larger one.
-double halved(double x) { return (x - 0.5) / 2; }
-
 GreyPlane plane_of_level(const GreyImage& image, int level) {
   if (level == 0) return {image.width, image.height, image.pixels.data()};
   int width = image.width, height = image.height;

@@ -19,6 +19,8 @@ PatchScene scene_of_level(const PhotometricProblem& problem, const PhotometricOp
 
 /// (x, y, 1) of every point's pixel in its host.
 std::vector<double> rays_of(const PhotometricProblem& problem);
+/// Pixel (x, y) of a level is at (2 x + 1/2, 2 y + 1/2) of the next larger one.
+inline double halved(double x) { return (x - 0.5) / 2; }
 
 PatchState state_of(const PhotometricProblem& problem, bool rays);
 void store_state(const PatchState& state, bool rays, PhotometricProblem& problem);

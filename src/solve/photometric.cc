@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 #include <new>
+#include <utility>
 
 #include "linear/kernel_table.h"
 #include "linear/photometric_system.h"
@@ -12,6 +13,7 @@
 #include "platform/memory.h"
 #include "sheaf/solve.h"
 #include "solve/choose_solver.h"
+#include "solve/patch_anchor.h"
 #include "solve/patch_level.h"
 #include "solve/patch_statistics.h"
 #include "solve/photometric_forecast.h"
@@ -30,6 +32,7 @@ class Refinement {
         threads_(options.threads),
         kernels_(*available_kernels().front()),
         rays_(uses_rays(problem, options)),
+        measurements_(measurements_of(problem, options)),
         state_(state_of(problem, rays_)) {}
 
   /// The process's peak resident size.
@@ -49,11 +52,14 @@ class Refinement {
     summary_.patches_visible = seen.size();
     PatchStatistics statistics(finest, seen);
     statistics.measure_before(state_);
+    summary_.measurements = measurements_.size();
+    summary_.initial_rms_px = rms_of(measurements_, finest, state_);
     for (int level = options_.levels - 1; level > 0; --level)
       if (!refine(scene_of_level(problem_, options_, pattern_, level), level)) break;
     if (options_.levels == 1 || converged()) refine(finest, 0);
     solve.solve_s = clock_.seconds() - solve.setup_s;
     statistics.measure_after(state_);
+    summary_.final_rms_px = rms_of(measurements_, finest, state_);
     report(statistics);
     store_state(state_, rays_, problem_);
     return summary_;
@@ -70,6 +76,7 @@ class Refinement {
     out.prior_b = options_.prior_b;
     out.loss_per_patch = options_.loss_per_patch;
     out.leaving_is_free = options_.leaving == Leaving::free;
+    out.exact_rows = options_.rows == PatchRows::exact;
     return out;
   }
 
@@ -110,14 +117,28 @@ class Refinement {
   bool refine(const PatchScene& scene, int level) {
     std::vector<Sight> sights = sights_of_round(scene);
     const ScaledLoss loss = scaled_loss(scene, sights);
-    for (int round = 1; descend(scene, sights, loss, level); ++round) {
-      if (round >= options_.rounds || options_.leaving == Leaving::free) return true;
+    double anchor_sigma = sigma_of_anchor(scene, sights);
+    for (int round = 1; descend(scene, sights, loss, level, anchor_sigma); ++round) {
+      if (round >= options_.rounds) return true;
       std::vector<Sight> next = sights_of_round(scene);
-      if (!differ(sights, next)) return true;
+      const double next_sigma = sigma_of_anchor(scene, next);
+      if (!differ(sights, next) && !differ(anchor_sigma, next_sigma)) return true;
       sights = std::move(next);
+      anchor_sigma = next_sigma;
     }
     return false;
   }
+
+  /// A pixel's standard deviation as a measured position is weighed against it. Unlike the loss's
+  /// scale it follows the rounds: from afar the anchor leads, and then the pixels do.
+  double sigma_of_anchor(const PatchScene& scene, const std::vector<Sight>& sights) {
+    if (measurements_.empty()) return 0;
+    PhotometricSystem system(scene, state_, sights, rules(), kernels_, threads_);
+    summary_.anchor_sigma_grey =
+        std::max(kLeastSigma, kSigmaPerMedian * system.residual_scale(0.5));
+    return summary_.anchor_sigma_grey;
+  }
+  static bool differ(double sigma, double next) { return std::abs(next - sigma) > 0.05 * sigma; }
 
   /// By more than one patch in fifty.
   static bool differ(const std::vector<Sight>& a, const std::vector<Sight>& b) {
@@ -154,9 +175,10 @@ class Refinement {
 
   /// Steps until they converge; false where they did not.
   bool descend(const PatchScene& scene, const std::vector<Sight>& sights, const ScaledLoss& loss,
-               int level) {
+               int level, double anchor_sigma) {
     Summary& solve = summary_.solve;
-    PhotometricSystem system(scene, state_, sights, rules(), kernels_, threads_);
+    Anchor anchor = anchor_of_level(measurements_, scene, state_, options_, level, anchor_sigma);
+    PhotometricSystem system(scene, state_, sights, rules(), kernels_, threads_, std::move(anchor));
     if (solve.rounds.empty()) solve.setup_s = clock_.seconds();
     solve.solver = system.solver_name();
     LossRound round;
@@ -201,6 +223,7 @@ class Refinement {
   Threads threads_;
   const Kernels& kernels_;
   const bool rays_;
+  const std::vector<Measurement> measurements_;
   PatchState state_;
   bool brightness_fitted_ = false;
   double sigma_ = 0;
@@ -226,6 +249,7 @@ Result<Pattern> check_photometric(const PhotometricProblem& problem,
     if (std::min(problem.images[i].width, problem.images[i].height) >> (options.levels - 1) < 16)
       return usage("image " + std::to_string(i) + " has fewer than 16 x 16 pixels at level " +
                    std::to_string(options.levels));
+  if (Result<void> anchor = check_anchor(problem, options); !anchor.ok()) return anchor.error();
   if (options.loss.graduated) return usage("graduated losses are not for photometric rows");
   if (!rays) return problem.patch;
   return make_pattern(options.pattern);

@@ -24,7 +24,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift", "--photometric",
                     "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
-                    "--occluder", "--start"});
+                    "--occluder", "--start", "--measured"});
   if (verb == "photometric")
     options.insert({"--output",
                     "--intrinsics",
@@ -57,7 +57,10 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--seed",
                     "--ply",
                     "--pictures",
-                    "--memory-limit"});
+                    "--memory-limit",
+                    "--anchor",
+                    "--anchor-loss",
+                    "--rows"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",

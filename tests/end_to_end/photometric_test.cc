@@ -99,6 +99,48 @@ TEST_F(PhotometricCommand, OptionsWork) {
   EXPECT_EQ(run({"photometric", "scene", "--time-limit", "1e-9"}).exit_code, 130);
 }
 
+TEST_F(PhotometricCommand, IsAnchoredToMeasuredPositions) {
+  ASSERT_EQ(run({"generate", "wide", "--photometric", "--points", "300", "--start", "8",
+                 "--measured", "0.4"})
+                .exit_code,
+            0);
+  const Outcome outcome = run({"photometric", "wide", "-o", "anchored", "--anchor", "0.4",
+                               "--anchor-loss", "huber:2", "--rows", "exact", "--json", "a.json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("measured positions, rms"), std::string::npos) << outcome.out;
+  const auto json = json_of(folder_ / "a.json");
+  EXPECT_GT(json["anchor"]["measurements"], 1000);
+  EXPECT_GT(json["anchor"]["rms_px"]["before"], 4);
+  EXPECT_LT(json["anchor"]["rms_px"]["after"], 0.8);
+  EXPECT_EQ(contents_of(folder_ / "anchored/measurements.txt"),
+            contents_of(folder_ / "wide/measurements.txt"));
+  // Not asked for, they do not count.
+  ASSERT_EQ(run({"photometric", "wide", "--max-iterations", "1", "--json", "b.json"}).exit_code, 0);
+  EXPECT_EQ(json_of(folder_ / "b.json")["anchor"]["measurements"], 0);
+}
+
+TEST_F(PhotometricCommand, SaysWhatIsWrongWithAnAnchor) {
+  const auto refused = [&](int code, const std::vector<std::string>& arguments,
+                           const std::string& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
+  };
+  refused(2, {"photometric", "scene", "--anchor", "1"}, "measured positions");
+  refused(2, {"photometric", "scene", "--anchor", "0"}, "above 0");
+  refused(2, {"photometric", "scene", "--anchor-loss", "huber:2"}, "--anchor");
+  refused(2, {"photometric", "scene", "--anchor", "1", "--anchor-loss", "huber:auto"},
+          "standard deviations");
+  refused(2, {"photometric", "scene", "--rows", "some"}, "exact");
+  write_text(in_scene("measurements.txt"), "0 1 10 10\n300 1 10 10\n");
+  refused(3, {"photometric", "scene"},
+          "measurements.txt:2: found '300', expected the point of measured position 1, 0 to 299");
+  write_text(in_scene("measurements.txt"), "0 6 10 10\n");
+  refused(3, {"photometric", "scene"}, "image of measured position 0, 0 to 5");
+  write_text(in_scene("measurements.txt"), "0 1 10\n");
+  refused(3, {"photometric", "scene"}, "entry 2 of 2 of measured position 0");
+}
+
 TEST_F(PhotometricCommand, SaysWhatIsWrong) {
   const auto refused = [&](int code, const std::vector<std::string>& arguments,
                            const std::string& words) {

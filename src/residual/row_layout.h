@@ -1,0 +1,25 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+namespace sheaf {
+
+/// The fields of an observation's two rows in the order in which they are stored: residual (2), by
+/// the camera block (2 x 9), by the point (2 x 3).
+namespace row_field {
+constexpr int residual(int row) { return row; }
+constexpr int camera(int row, int column) { return 2 + 9 * row + column; }
+constexpr int point(int row, int column) { return 20 + 3 * row + column; }
+constexpr int kCount = 26;
+}  // namespace row_field
+
+/// Where plain code finds them in the stored rows of a batch: field f of a lane is at
+///   rows[kRowBatch * batch + first_row_field(lanes, lane) + lanes * f]
+/// with so many lanes in a part of the instruction set (RowKernels::lanes).
+constexpr std::size_t first_row_field(int lanes, int lane) {
+  return static_cast<std::size_t>(lane / lanes * row_field::kCount * lanes + lane % lanes);
+}
+
+}  // namespace sheaf
