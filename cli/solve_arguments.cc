@@ -50,7 +50,7 @@ bool parse_fix_item(std::string_view item, Fixed& out) {
   std::uint32_t index = 0;
   if (item == "points") return out.points = true;
   if (item == "poses") return out.poses = true;
-  if (item == "intrinsics") return out.f = out.k1 = out.k2 = true;
+  if (item == "intrinsics") return out.intrinsics = true;
   if (item == "f") return out.f = true;
   if (item == "k1") return out.k1 = true;
   if (item == "k2") return out.k2 = true;

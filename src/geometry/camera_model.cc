@@ -33,6 +33,12 @@ std::vector<std::string_view> parameter_names(CameraModel model) {
   });
 }
 
+ParameterSet principal_point(CameraModel model) {
+  const ParameterRoles roles = roles_of(model);
+  if (roles.cx < 0) return 0;
+  return static_cast<ParameterSet>(1u << roles.cx | 1u << roles.cy);
+}
+
 std::string_view to_string(CameraModel model) {
   return with_lens(model, [](auto lens) { return decltype(lens)::kName; });
 }

@@ -52,7 +52,6 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 
 Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
-  if (Result<void> known = BalView::check(problem); !known.ok()) return known;
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   for (std::uint32_t i : options.fixed.pose_ids)
     if (i >= problem.num_images())
@@ -63,6 +62,10 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
       if (i >= problem.cameras.size())
         return usage("fixed camera " + std::to_string(i) + " is not one of the " +
                      std::to_string(problem.cameras.size()) + " cameras");
+  if (const std::size_t sets = options.fixed.parameters.size();
+      sets > 0 && sets != problem.cameras.size())
+    return usage("fixed parameters are given for " + std::to_string(sets) + " of " +
+                 std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
   if (options.inner_iterations < 0) return usage("inner_iterations is negative");
