@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "linear/lens_system.h"
 #include "linear/plan.h"
 #include "sheaf/error.h"
 #include "sheaf/options.h"
@@ -26,5 +27,13 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
 /// Points held and no lens shared: each image by itself. `batches`: count_image_batches.
 Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
                                  const SolveOptions& options, const MemoryHeld& held);
+
+/// Lenses of any model: pairs are listed where the matrix is to be formed.
+struct LensChoice {
+  Choice choice;
+  LensChunks chunks;
+};
+Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const SolveOptions& options,
+                                     Threads& threads);
 
 }  // namespace sheaf

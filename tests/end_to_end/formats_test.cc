@@ -119,9 +119,10 @@ TEST_F(FormatsCommand, RefusesWithTheRightExitCodes) {
     camera = {CameraModel::opencv_fisheye, {500, 500, 320, 240, 0, 0, 0, 0}, 640, 480};
   write(wide, folder_ / "wide/").value();
   EXPECT_EQ(run({"info", "wide"}).exit_code, 0);
-  const Outcome solved = run({"solve", "wide"});
-  EXPECT_EQ(solved.exit_code, 2);
-  EXPECT_NE(solved.err.find("camera 0 is OPENCV_FISHEYE: solve refines BAL"), std::string::npos);
+  EXPECT_EQ(run({"solve", "wide", "-o", "refined/"}).exit_code, 0);
+  const Outcome refused = run({"solve", "wide", "--trust-region", "dogleg"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("the dogleg is for BAL"), std::string::npos) << refused.err;
 }
 
 }  // namespace
