@@ -119,7 +119,7 @@ struct ProjectOnLanes {
 template <Wanted kWanted>
 HWY_NOINLINE void project_on_lanes(CameraModel model, const Lane* k, const Lane* P,
                                    LensJacobian<Lane>& out) {
-  with_lens(model, ProjectOnLanes<kWanted>{k, P, out});
+  HWY_NAMESPACE::with_lens(model, ProjectOnLanes<kWanted>{k, P, out});
 }
 
 }  // namespace HWY_NAMESPACE

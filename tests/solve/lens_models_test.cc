@@ -179,11 +179,11 @@ TEST(LensModels, StepsAreTheTextbooksWhereOneImageSeesAPointTwice) {
 }
 
 /// What a start and options end with.
-struct Run {
+struct Solved {
   Problem problem;
   Summary summary;
 
-  Run(const Problem& start, const SolveOptions& options) : problem(start) {
+  Solved(const Problem& start, const SolveOptions& options) : problem(start) {
     summary = solve(problem, options);
   }
 };
@@ -193,10 +193,10 @@ TEST(LensModels, EveryInstructionSetAndThreadCountEndsAlike) {
     SolveOptions options;
     options.threads = 1;
     options.loss = Huber{1};
-    const Run best(start, options);
+    const Solved best(start, options);
     EXPECT_LT(best.summary.final_cost, 0.5 * best.summary.initial_cost);
     options.threads = 3;
-    const Run threads(start, options);
+    const Solved threads(start, options);
     EXPECT_EQ(state_hash(best.problem), state_hash(threads.problem));
     for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2}) {
       options.simd = simd;
@@ -209,21 +209,34 @@ TEST(LensModels, EveryInstructionSetAndThreadCountEndsAlike) {
   }
 }
 
+/// Enough of everything that all parameters are well determined.
+Problem determined(bool shared) {
+  const Problem problem = thinned(disturbed({ordinary(CameraModel::opencv),
+                                             ordinary(CameraModel::radial_fisheye)},
+                                            10, 300, 13),
+                                  14);
+  return shared ? problem : unshared(problem);
+}
+
 TEST(LensModels, SolversEndAlike) {
-  for (const Problem& start : mixtures()) {
+  for (bool shared : {true, false}) {
+    const Problem start = determined(shared);
     SolveOptions options;
-    options.tolerance = 1e-12;
+    options.tolerance = 1e-13;
+    options.max_iterations = 200;
     options.solver = CameraSolverKind::dense;
-    const Run dense(start, options);
+    const Solved dense(start, options);
     EXPECT_EQ(dense.summary.solver, "dense");
     EXPECT_NEAR(dense.summary.final_cost, evaluate(dense.problem).cost,
                 1e-10 * dense.summary.final_cost);
-    EXPECT_LT(scaled_gradient(dense.problem), 1e-4);
-    for (CameraSolverKind kind : {CameraSolverKind::sparse, CameraSolverKind::iterative_explicit}) {
+    EXPECT_LT(scaled_gradient(dense.problem), 1e-3);
+    for (CameraSolverKind kind : {CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+                                  CameraSolverKind::iterative_implicit}) {
       options.solver = kind;
-      const Run other(start, options);
+      const Solved other(start, options);
       EXPECT_NEAR(other.summary.final_cost, dense.summary.final_cost,
-                  1e-6 * dense.summary.final_cost);
+                  1e-8 * dense.summary.final_cost)
+          << other.summary.solver;
     }
   }
 }
@@ -233,7 +246,7 @@ TEST(LensModels, WhatIsHeldStaysBitForBit) {
     SolveOptions options;
     options.fixed.pose_ids = {1};
     options.fixed.camera_ids = {0};
-    const Run run(start, options);
+    const Solved run(start, options);
     EXPECT_EQ(run.problem.poses[1].rotation, start.poses[1].rotation);
     EXPECT_EQ(run.problem.poses[1].translation, start.poses[1].translation);
     EXPECT_EQ(run.problem.cameras[0].parameters, start.cameras[0].parameters);
@@ -302,7 +315,7 @@ TEST(LensModels, WideLensesConvergeFromADegreeAndAHundredth) {
     for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
       if ((principal_point(model) >> k & 1) == 0)
         start.cameras[0].parameters[k] *= 1 + 0.01 * normal(random);
-    const Run run(start, {.max_iterations = 100, .tolerance = 1e-12});
+    const Solved run(start, {.max_iterations = 100, .tolerance = 1e-12});
     EXPECT_LT(run.summary.final_rms_px, 1e-6);
     for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
       EXPECT_NEAR(run.problem.cameras[0].parameters[k], truth.cameras[0].parameters[k],

@@ -88,11 +88,11 @@ Scene shared_lens_scene(std::uint32_t together, bool keep_unused) {
   for (std::size_t i = 0; i < truth.num_observations(); ++i) {
     const std::uint32_t image = truth.observation_image[i];
     const double* X = &truth.points[3 * std::size_t(truth.observation_point[i])];
-    const auto& k = truth.cameras[truth.image_camera[image]].parameters;
+    const Camera& camera = truth.cameras[truth.image_camera[image]];
     const auto R = matrix_from_quaternion(truth.poses[image].rotation);
     Vector3<double> P = multiply(R, Vector3<double>{X[0], X[1], X[2]});
     for (int j = 0; j < 3; ++j) P[j] += truth.poses[image].translation[j];
-    const auto pixel = project(BalCamera<double>{k[0], k[1], k[2]}, P);
+    const auto pixel = project(camera, P).pixel;
     for (int j = 0; j < 2; ++j) {  // the noise stays, the pixel moves
       const double moved = pixel[j] - truth.observation_xy[2 * i + j];
       truth.observation_xy[2 * i + j] += moved;
