@@ -79,8 +79,9 @@ void add_photometric_scene_options(CLI::App& verb, PhotometricSceneArguments& a)
   number("--start", "PX", o.start_px, 100,
          "median distance of patches from their place at the start",
          "a number of pixels from 0 to 100");
-  for (const char* name : {"--like", "--family", "--drift", "--mean-track", "--pixel-noise",
-                           "--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
+  for (const char* name :
+       {"--like", "--family", "--camera", "--drift", "--mean-track", "--pixel-noise",
+        "--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
     flag->excludes(verb.get_option(name));
 }
 
