@@ -100,7 +100,10 @@ TEST_F(FormatsCommand, PerturbsAndComparesModels) {
   const Outcome compared =
       run({"compare", "start", "--solvers", "sheaf", "--peers", "/nowhere", "--json", "c.json"});
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
-  EXPECT_NE(compared.err.find("as a BAL file states it"), std::string::npos);
+  EXPECT_EQ(compared.err.find("as a BAL file states it"), std::string::npos);
+  const Outcome own = run({"compare", "start", "--solvers", "sheaf", "--own-lenses"});
+  EXPECT_EQ(own.exit_code, 0) << own.err;
+  EXPECT_NE(own.err.find("as a BAL file states it"), std::string::npos);
   EXPECT_EQ(json_of(folder_ / "c.json")["runs"].size(), 1u);
 }
 
