@@ -40,6 +40,7 @@ int run(const Arguments& arguments) {
   const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const std::vector<Finding> findings = check(input.problem);
   fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
+  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   for (const Finding& finding : findings)
     fmt::print("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
                places_text(finding));

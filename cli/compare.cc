@@ -22,7 +22,6 @@
 #include "report/comparison.h"
 #include "scene/camera_frame.h"
 #include "sheaf/sheaf.h"
-#include "solve_arguments.h"
 #include "solver_programs.h"
 #include "solver_run.h"
 #include "summary_text.h"
@@ -38,7 +37,7 @@ struct Arguments {
   std::string in, reference, solvers, peers, plot;
   std::vector<double> taus = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
   int runs = 1;
-  bool steps = false;
+  bool steps = false, own_lenses = false;
 };
 
 void tell(const Arguments& arguments, const SolverRun& run) {
@@ -67,9 +66,9 @@ std::vector<SolverRun> run_all(const Arguments& arguments,
   return runs;
 }
 
-// What every solver reads: as a BAL file states it, a lens for each image.
-void make_bal(InputFile& input, bool quiet) {
-  if (input.format == "bal") return;
+// A BAL file's problem: a lens for each image. A COLMAP model stays what it is, unless asked.
+void make_bal(InputFile& input, bool own_lenses, bool quiet) {
+  if (input.format == "bal" || (input.format.starts_with("colmap") && !own_lenses)) return;
   Problem& problem = input.problem;
   to_bal_cameras(problem).value();
   if (!quiet)
@@ -96,6 +95,10 @@ void write_plot(const Arguments& arguments, const ComparisonRecord& record,
   file.value().commit().value();
 }
 
+Json list_json(const std::vector<std::string>& lists) {
+  return lists.empty() ? Json() : Json(fmt::format("{}", fmt::join(lists, ",")));
+}
+
 Json document_of(const Arguments& arguments, const Json& input, const SolverList& solvers,
                  const ComparisonRecord& record, const Timer& total) {
   Json missing = Json::array();
@@ -107,7 +110,9 @@ Json document_of(const Arguments& arguments, const Json& input, const SolverList
           {"options",
            {{"threads", record.threads},
             {"tolerance", limits.tolerance},
-            {"fix", limits.fix.empty() ? Json() : Json(limits.fix)},
+            {"fix", list_json(limits.refinement.fix)},
+            {"refine", list_json(limits.refinement.refine)},
+            {"own_lenses", arguments.own_lenses},
             {"max_iterations", limits.max_iterations},
             {"time_limit_s", limits.time_s},
             {"runs", arguments.runs},
@@ -126,7 +131,9 @@ void print(const Arguments& arguments, const Problem& problem, const SolverList&
       "{:g} of it, {} steps or {:g} s\n",
       record.threads, record.threads == 1 ? "" : "s", arguments.limits.tolerance,
       arguments.limits.max_iterations, arguments.limits.time_s);
-  if (!arguments.limits.fix.empty()) fmt::print("held: {}\n", arguments.limits.fix);
+  if (arguments.limits.refinement.given())
+    fmt::print("held: {}\n",
+               held_text(refinement_of(arguments.limits.refinement, problem), problem));
   fmt::print("best cost {:.10g}\n\n{}", record.best, comparison_text(record));
   if (arguments.steps) fmt::print("\n{}\n", steps_table(record));
   for (const MissingSolver& solver : solvers.missing)
@@ -140,12 +147,12 @@ int run(const Arguments& arguments) {
   check_outputs({{"--plot", arguments.plot}, {"--json", json}});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json input_document = input_json(arguments.in, input);
-  make_bal(input, arguments.common.quiet);
+  make_bal(input, arguments.own_lenses, arguments.common.quiet);
   Problem reference;
   if (!arguments.reference.empty()) reference = read(arguments.reference).value();
   const char* folders = std::getenv("SHEAF_PEERS");
-  Fixed fixed;
-  if (!arguments.limits.fix.empty()) parse_fix(arguments.limits.fix, fixed);
+  const Fixed fixed =
+      fixed_of(refinement_of(arguments.limits.refinement, input.problem), input.problem);
   const SolverList solvers = find_solvers(
       arguments.solvers, !arguments.peers.empty() || folders == nullptr ? arguments.peers : folders,
       input.problem, fixed);
@@ -202,10 +209,12 @@ void add_compare_options(CLI::App& verb, Arguments& a) {
       ->type_name("T")
       ->check(number_in(0, std::numeric_limits<double>::max(), true, "a number from 0 up"))
       ->capture_default_str();
-  verb.add_option("--fix", a.limits.fix,
-                  "what every solver holds, as in solve; one that cannot is a row that says so")
-      ->type_name("LIST")
-      ->check(parsed_by<Fixed>(parse_fix));
+  add_refinement_options(verb, a.limits.refinement,
+                         "what every solver holds (one that cannot is a row that says so)");
+  verb.add_flag(
+      "--own-lenses", a.own_lenses,
+      "give each image of a COLMAP model a lens f, k1, k2 of its own, as a BAL file states "
+      "it, so that peers that read those can take part");
   verb.add_option("--time-to", a.taus, "times until the cost is within these parts of the best")
       ->type_name("TAUS")
       ->delimiter(',')
@@ -235,7 +244,9 @@ void add_compare(CLI::App& app, int& exit_code) {
       "\nWith every peer that is installed, and errors against a known truth:\n"
       "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json\n"
       "\nPoses and lenses alone, step by step:\n"
-      "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps");
+      "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps\n"
+      "\nA COLMAP model with the lenses that its images share, beside COLMAP:\n"
+      "  sheaf compare model --solvers sheaf,colmap --runs 5");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -114,11 +114,12 @@ void add_convert(CLI::App& app, int& exit_code) {
   CLI::App& verb = *app.add_subcommand("convert", "read a problem and write it in another format");
   verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
   verb.add_option("OUT", arguments->out, kProblemOut)->type_name("FILE")->required();
-  verb.add_option("--format", arguments->format,
-                  "write this whatever the name: bal, colmap (binary), colmap-text, bundler, nvm "
-                  "or ply; what it does not hold is said")
+  verb.add_option(
+          "--format", arguments->format,
+          "write this whatever the name: bal, colmap (binary), colmap-text, bundler, nvm, libmv "
+          "or ply; what it does not hold is said")
       ->type_name("NAME")
-      ->check(one_of({"bal", "colmap", "colmap-text", "bundler", "nvm", "ply"}));
+      ->check(one_of({"bal", "colmap", "colmap-text", "bundler", "nvm", "libmv", "ply"}));
   add_clean_options(verb, arguments->clean);
   add_common_options(verb, arguments->common);
   verb.footer(

@@ -27,6 +27,7 @@ struct Arguments {
   CommonOptions common;
   SceneOptions scene;
   FamilyArguments family;
+  LensArguments lens;
   PhotometricSceneArguments photometric;
   std::string out, truth;
 };
@@ -46,10 +47,17 @@ bool is_point_cloud(std::filesystem::path path) {
   return path.extension() == ".ply";
 }
 
+// A scene of named lenses is a COLMAP model where its name does not say otherwise.
+WriteOptions format_of(const std::string& path, const Arguments& arguments) {
+  const bool model = arguments.lens.chosen() && std::filesystem::path(path).extension().empty();
+  return {.format = model ? "colmap" : ""};
+}
+
 Made write_whole(const Scene& scene, const Arguments& arguments) {
   const Timer writing;
-  write(scene.start, arguments.out).value();
-  if (!arguments.truth.empty()) write(scene.truth, arguments.truth).value();
+  write(scene.start, arguments.out, format_of(arguments.out, arguments)).value();
+  if (!arguments.truth.empty())
+    write(scene.truth, arguments.truth, format_of(arguments.truth, arguments)).value();
   const double write_s = writing.seconds();
   return {counts_json(scene.start),     counts_text(scene.start),      statistics_of(scene.start),
           evaluate(scene.start).rms_px, Json(size_bytes(scene.start)), write_s};
@@ -63,6 +71,8 @@ StreamedScene stream_to(CountingSink& sink, const FamilyOptions& options, SceneS
 
 Made make(const Arguments& arguments, Interrupt& interrupt) {
   interrupt.begin_write();
+  if (arguments.lens.chosen())
+    return write_whole(generate(lens_options(arguments.lens, arguments.scene)).value(), arguments);
   if (!arguments.family.chosen()) return write_whole(generate(arguments.scene).value(), arguments);
   const FamilyOptions options = family_options(arguments.family, arguments.scene);
   if (is_point_cloud(arguments.out) || is_point_cloud(arguments.truth))
@@ -82,6 +92,7 @@ Json document_of(const Arguments& arguments, const Made& made, double total_s) {
                    {"output", arguments.out},
                    {"truth", arguments.truth.empty() ? Json() : Json(arguments.truth)}};
   document["options"].update(family_json(arguments.family, arguments.scene));
+  document["options"].update(lens_json(arguments.lens));
   document.update(made.counts);
   document.update(statistics_json(made.statistics));
   document["rms_px"] = number(made.rms_px);
@@ -95,7 +106,9 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"OUT", arguments.out}, {"--truth", arguments.truth}, {"--json", json}});
+  const bool folders = arguments.lens.chosen();
+  check_outputs(
+      {{"OUT", arguments.out, folders}, {"--truth", arguments.truth, folders}, {"--json", json}});
   const Made made = make(arguments, interrupt);
   const Statistics& statistics = made.statistics;
   fmt::print("{}: {}\n", arguments.out, made.text);
@@ -114,8 +127,10 @@ int run(const Arguments& arguments) {
 void add_generate(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& verb = *app.add_subcommand("generate", "make a synthetic scene, disturbed");
-  verb.add_option("OUT", arguments->out,
-                  "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --photometric")
+  verb.add_option(
+          "OUT", arguments->out,
+          "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --camera (a COLMAP "
+          "model) and --photometric")
       ->type_name("FILE")
       ->required();
   verb.add_option("--truth", arguments->truth,
@@ -123,12 +138,15 @@ void add_generate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   add_scene_options(verb, arguments->scene);
   add_family_options(verb, arguments->family);
+  add_lens_options(verb, arguments->lens);
   add_photometric_scene_options(verb, arguments->photometric);
   add_common_options(verb, arguments->common);
   verb.footer(
       "Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt\n"
       "\nA synthetic scene of a published problem's size:\n"
       "  sheaf generate street.txt --like ladybug-138\n"
+      "\nA COLMAP model of 500 images through one fisheye:\n"
+      "  sheaf generate model --camera OPENCV_FISHEYE --shared --cameras 500 --points 20000\n"
       "\nImages of a textured surface, poses and points for sheaf photometric:\n"
       "  sheaf generate scene --photometric --truth truth");
   verb.callback([arguments, &exit_code, &verb] {

@@ -86,8 +86,9 @@ void add_photometric_scene_options(CLI::App& verb, PhotometricSceneArguments& a)
       ->type_name("SIGMA_PX")
       ->check(number_in(0, 100, true, "a number of pixels from 0 to 100"))
       ->needs(flag);
-  for (const char* name : {"--like", "--family", "--drift", "--mean-track", "--pixel-noise",
-                           "--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
+  for (const char* name :
+       {"--like", "--family", "--camera", "--drift", "--mean-track", "--pixel-noise",
+        "--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
     flag->excludes(verb.get_option(name));
 }
 

@@ -32,18 +32,13 @@ Json iteration_json(const Iteration& it) {
 }
 
 Json options_json(const SolveArguments& a) {
-  Json fix = Json::array();
-  for (std::size_t begin = 0; begin < a.fix.size();) {
-    const std::size_t end = std::min(a.fix.find(',', begin), a.fix.size());
-    fix.push_back(a.fix.substr(begin, end - begin));
-    begin = end + 1;
-  }
   return {{"max_iterations", a.max_iterations},
           {"tolerance", a.tolerance},
           {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
           {"loss", a.loss},
           {"cheirality", a.cheirality},
-          {"fix", fix},
+          {"fix", items_of(a.refinement.fix)},
+          {"refine", items_of(a.refinement.refine)},
           {"points", a.points},
           {"solver", a.solver},
           {"precision", a.precision},

@@ -17,7 +17,8 @@ void add_scene_options(CLI::App& verb, SceneOptions& o) {
         ->check(number_in(0, most, true, "a number from 0 up"))
         ->capture_default_str();
   };
-  verb.add_option("--cameras", o.images, "images, each with a lens of its own")
+  verb.add_option("--cameras", o.images,
+                  "images, each with a lens of its own unless --camera says so")
       ->type_name("N")
       ->check(whole_number_from(2, "a whole number from 2 up"))
       ->capture_default_str();
@@ -68,6 +69,50 @@ void add_family_options(CLI::App& verb, FamilyArguments& a) {
       ->type_name("S")
       ->check(number_in(0, 100, true, "a number from 0 to 100"))
       ->capture_default_str();
+}
+
+void add_lens_options(CLI::App& verb, LensArguments& a) {
+  std::vector<std::string> names;
+  for (std::size_t m = 0; m < kCameraModels; ++m)
+    names.emplace_back(to_string(static_cast<CameraModel>(m)));
+  CLI::Option* camera =
+      verb.add_option("--camera", a.camera,
+                      "a scene through lenses of this model (docs/cameras.md), as OPENCV or EUCM; "
+                      "OUT is then the folder of a COLMAP model, unless its name has an extension")
+          ->type_name("MODEL")
+          ->check(one_of(names));
+  for (const char* name : {"--like", "--family", "--outliers", "--drift"})
+    camera->excludes(verb.get_option(name));
+  CLI::Option* shared =
+      verb.add_flag("--shared", a.shared, "with --camera: one lens for all images")->needs(camera);
+  verb.add_option("--lenses", a.lenses, "with --camera: so many lenses, which images take in turn")
+      ->type_name("N")
+      ->check(whole_number_from(1, "a whole number from 1 up"))
+      ->needs(camera)
+      ->excludes(shared);
+  verb.add_option(
+          "--field-of-view", a.field_of_view_deg,
+          "with --camera: full angle in degrees [65 for perspective models, 200 for fisheyes, "
+          "FOV and EUCM]")
+      ->type_name("DEGREES")
+      ->check(number_in(5, 220, true, "a number from 5 to 220"))
+      ->needs(camera);
+}
+
+LensSceneOptions lens_options(const LensArguments& a, const SceneOptions& scene) {
+  return {.model = *camera_model_named(a.camera),
+          .lenses = a.shared ? 1 : a.lenses,
+          .field_of_view_deg = a.field_of_view_deg,
+          .scene = scene};
+}
+
+Json lens_json(const LensArguments& a) {
+  if (!a.chosen())
+    return {{"camera", nullptr}, {"lenses", nullptr}, {"field_of_view_deg", nullptr}};
+  return {{"family", nullptr},
+          {"camera", a.camera},
+          {"lenses", a.shared ? 1 : a.lenses},
+          {"field_of_view_deg", a.field_of_view_deg > 0 ? Json(a.field_of_view_deg) : Json()}};
 }
 
 FamilyOptions family_options(const FamilyArguments& a, const SceneOptions& scene) {

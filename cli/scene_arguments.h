@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 
 #include "json_document.h"
@@ -23,6 +24,21 @@ struct FamilyArguments {
 
 /// --like, --family, --outliers and --drift, after `add_scene_options`.
 void add_family_options(CLI::App& verb, FamilyArguments& arguments);
+
+/// Scenes through lenses of a model; counts, noises and seed are those of the SceneOptions.
+struct LensArguments {
+  std::string camera;  ///< name of a model; empty: no such scene
+  bool shared = false;
+  std::uint64_t lenses = 0;
+  double field_of_view_deg = 0;
+  bool chosen() const { return !camera.empty(); }
+};
+
+/// --camera, --shared, --lenses and --field-of-view, after the others.
+void add_lens_options(CLI::App& verb, LensArguments& arguments);
+LensSceneOptions lens_options(const LensArguments& arguments, const SceneOptions& scene);
+/// `null`s where no such scene was asked for.
+Json lens_json(const LensArguments& arguments);
 
 /// Throws Error (ErrorCode::usage) for a name that is not known.
 FamilyOptions family_options(const FamilyArguments& arguments, const SceneOptions& scene);

@@ -37,6 +37,14 @@ Problem state_of(const Problem& problem) {
   return state;
 }
 
+// Says what --fix and --refine leave where it is; nothing where nothing was asked for.
+std::string hold(const RefinementArguments& arguments, const Problem& problem, Fixed& fixed) {
+  if (!arguments.given()) return "";
+  const Refinement refinement = refinement_of(arguments, problem);
+  fixed = fixed_of(refinement, problem);
+  return fmt::format("held        {}\n", held_text(refinement, problem));
+}
+
 // The best state found, and what was written.
 std::vector<std::string> write_results(const Arguments& arguments, Problem before,
                                        const Problem& after) {
@@ -75,6 +83,7 @@ int run(const Arguments& arguments) {
 
   Progress progress(arguments.common.quiet);
   SolveOptions options = solve_options(arguments.solve);
+  const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
   options.threads = arguments.common.threads;
   options.lend_observations = true;
   options.stop = interrupt.token();
@@ -94,7 +103,9 @@ int run(const Arguments& arguments) {
   if (summary.usable()) written = write_results(arguments, std::move(before), problem);
   record.write_s = writing.seconds();
   fmt::print("{}: {}\n", arguments.in, counts_text(problem));
+  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   fmt::print("{}", summary_text(summary, input.read_s));
+  fmt::print("{}", held);
   if (wants_json) {
     record.after = evaluate(problem);
     record.total_s = total.seconds();
@@ -120,7 +131,12 @@ void add_solve(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   add_solve_options(verb, arguments->solve);
   add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf solve problem.txt -o refined.txt --json summary.json");
+  verb.footer(
+      "Example:\n  sheaf solve problem.txt -o refined.txt --json summary.json\n"
+      "\nA COLMAP model, its first image in place and the principal point refined too:\n"
+      "  sheaf solve model -o refined --fix pose=IMG_0001.jpg --refine pp\n"
+      "\nOnly a new image's pose, all else as it is:\n"
+      "  sheaf solve model -o refined --fix points,poses,intrinsics --refine pose=new.jpg");
   verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

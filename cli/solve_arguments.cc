@@ -40,31 +40,6 @@ const std::map<std::string, Simd> kSimds = {{"best", Simd::best},
                                             {"avx2", Simd::avx2},
                                             {"avx512", Simd::avx512}};
 
-bool parse_index(std::string_view text, std::uint32_t& out) {
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, out);
-  return error == std::errc() && stop == end;
-}
-
-bool parse_fix_item(std::string_view item, Fixed& out) {
-  std::uint32_t index = 0;
-  if (item == "points") return out.points = true;
-  if (item == "poses") return out.poses = true;
-  if (item == "intrinsics") return out.f = out.k1 = out.k2 = true;
-  if (item == "f") return out.f = true;
-  if (item == "k1") return out.k1 = true;
-  if (item == "k2") return out.k2 = true;
-  if (item.substr(0, 5) == "pose=" && parse_index(item.substr(5), index)) {
-    out.pose_ids.push_back(index);
-    return true;
-  }
-  if (item.substr(0, 7) == "camera=" && parse_index(item.substr(7), index)) {
-    out.camera_ids.push_back(index);
-    return true;
-  }
-  return false;
-}
-
 /// How the camera system is solved, in what, and within which memory.
 void add_solver_options(CLI::App& verb, SolveArguments& a) {
   const double most = std::numeric_limits<double>::max();
@@ -165,21 +140,6 @@ std::string parse_loss(const std::string& text, Loss& out) {
   return "";
 }
 
-std::string parse_fix(const std::string& list, Fixed& out) {
-  std::string_view rest = list;
-  while (true) {
-    const std::size_t comma = rest.find(',');
-    const std::string_view item = rest.substr(0, comma);
-    if (!parse_fix_item(item, out))
-      return fmt::format(
-          "expected a comma-separated list of points, poses, intrinsics, f, k1, k2, pose=K, "
-          "camera=K (K from 0 up), not '{}'",
-          item);
-    if (comma == std::string_view::npos) return "";
-    rest.remove_prefix(comma + 1);
-  }
-}
-
 namespace {
 
 /// What is minimised.
@@ -207,12 +167,7 @@ void add_model_options(CLI::App& verb, SolveArguments& a) {
       ->type_name("NAME")
       ->check(one_of({"xyz", "homogeneous", "inverse-depth"}))
       ->capture_default_str();
-  verb.add_option(
-          "--fix", a.fix,
-          "hold these to the last bit: a comma-separated list of points, poses, intrinsics, "
-          "f, k1, k2, pose=K, camera=K")
-      ->type_name("LIST")
-      ->check(parsed_by<Fixed>(parse_fix));
+  add_refinement_options(verb, a.refinement, "hold these to the last bit");
 }
 
 /// When it ends.
@@ -250,7 +205,6 @@ SolveOptions solve_options(const SolveArguments& a) {
   if (a.time_limit_s > 0) options.time_limit_s = a.time_limit_s;
   parse_loss(a.loss, options.loss);
   options.cheirality = kCheiralities.at(a.cheirality);
-  if (!a.fix.empty()) parse_fix(a.fix, options.fixed);
   options.points = kParametrisations.at(a.points);
   options.solver = kSolvers.at(a.solver);
   options.precision = kPrecisions.at(a.precision);

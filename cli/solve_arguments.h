@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "refinement.h"
 #include "sheaf/options.h"
 
 namespace sheaf {
@@ -18,7 +19,7 @@ struct SolveArguments {
   std::string loss = "none";
   std::string cheirality = "formula";
   std::string points = "xyz";
-  std::string fix;
+  RefinementArguments refinement;
   std::string solver = "auto";
   std::string precision = "auto";
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none
@@ -30,11 +31,9 @@ struct SolveArguments {
 
 void add_solve_options(CLI::App& verb, SolveArguments& arguments);
 
-/// Everything but threads and callbacks. The arguments have passed their validators.
+/// Everything but threads, callbacks and what is fixed, which needs the problem. The arguments have
+/// passed their validators.
 SolveOptions solve_options(const SolveArguments& arguments);
-
-/// "" or what is wrong with a --fix list.
-std::string parse_fix(const std::string& list, Fixed& out);
 
 /// "" or what is wrong with a --loss, NAME[:SCALE|:auto][:gnc].
 std::string parse_loss(const std::string& text, Loss& out);

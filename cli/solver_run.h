@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <string>
 
+#include "refinement.h"
 #include "report/comparison.h"
 #include "sheaf/io.h"
 #include "solver_programs.h"
@@ -19,18 +20,20 @@ struct RunLimits {
   /// The one stopping rule of all: two accepted steps in a row that decrease the cost by less than
   /// this part of it.
   double tolerance = 1e-12;
-  std::string fix;  ///< as in `sheaf solve --fix`; may be empty
+  RefinementArguments refinement;  ///< as in `sheaf solve`
 };
 
-/// What the runs of one comparison have in common. Peers read plain BAL text: a compressed input is
-/// written out for them, in the scratch folder.
+/// What the runs of one comparison have in common. All read the same plain BAL text or, for a
+/// model, the same binary COLMAP folder; what is not that already is written out, in the scratch
+/// folder.
 struct RunSetting {
   RunSetting(const std::string& path, const InputFile& input, const Problem* reference, int threads,
              const RunLimits& limits, const std::filesystem::path& scratch, std::stop_token stop);
 
   const Problem& problem;
   const Problem* reference;  ///< or null
-  std::string path;          ///< of plain text
+  std::string path;          ///< of plain text, or of the folder
+  bool model = false;        ///< a COLMAP model with its own lenses, not a BAL file
   int threads;
   RunLimits limits;
   double kill_after_s;  ///< reading and writing included

@@ -20,8 +20,9 @@ inline constexpr const char* kProblemIn =
     "problem: a BAL, Bundler, NVM or libmv file, plain or .gz or .bz2, or the folder of a COLMAP "
     "model (told by content)";
 inline constexpr const char* kProblemOut =
-    "NAME.ply is a point cloud with cameras, NAME.out Bundler, NAME.nvm NVM, a folder (NAME/, or "
-    "NAME for what came from one) a COLMAP model, anything else BAL; .gz and .bz2 are compressed";
+    "NAME.ply is a point cloud with cameras, NAME.out Bundler, NAME.nvm NVM, NAME.problem libmv, a "
+    "folder (NAME/, or NAME for what came from one) a COLMAP model, anything else BAL; .gz and "
+    ".bz2 are compressed";
 
 /// Each adds its verb. A verb that ran leaves its exit code; errors are thrown as sheaf::Error.
 void add_solve(CLI::App& app, int& exit_code);

@@ -1,10 +1,14 @@
 #!/usr/bin/env python3
 # Copyright (c) 2026, the Sheaf authors.
 # SPDX-License-Identifier: BSD-3-Clause
-"""COLMAP's bundle adjuster, through its Python package pycolmap, on a BAL file.
+"""COLMAP's bundle adjuster, through its Python package pycolmap, on a BAL file or a COLMAP model.
 
 The words of --config, joined by '-': dense | sparse | iterative (Schur elimination, then that). --fix
-takes points, poses, intrinsics.
+takes points, poses, intrinsics, f, k, pp, camera=ID and pose=NAME, --refine takes pp (with the long
+names of `sheaf solve`): by default all but the principal point moves, as in COLMAP.
+
+A folder is a model, adjusted as it is: its lenses, shared or not, of whatever model COLMAP has.
+Rotations are normalised first, since COLMAP takes them as they stand.
 
 A BAL camera is COLMAP's RADIAL: f, k1, k2 and a principal point, held at 0. BAL looks along -z with
 y up, COLMAP along +z with y down: rotations and translations are turned by half a turn about x, the
@@ -14,7 +18,7 @@ must be that of the file, or the program ends with an error.
 COLMAP gives observations behind their camera a residual of zero, so a file that has some is refused.
 Its stopping rule is Ceres' function_tolerance: one step that decreases the cost by less than the
 tolerance ends the run (elsewhere two do). Its costs after each step are read from the table that
-Ceres prints, seven digits of them. Lenses are held whole or not at all.
+Ceres prints, seven digits of them.
 """
 import argparse
 import contextlib
@@ -36,6 +40,7 @@ def parse_arguments():
     parser.add_argument("input")
     parser.add_argument("--config", default="dense")
     parser.add_argument("--fix", default="")
+    parser.add_argument("--refine", default="")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--max-iterations", type=int, default=50)
     parser.add_argument("--time-limit", type=float, default=1e9)
@@ -108,13 +113,32 @@ def build(pycolmap, observations, cameras, points):
     return reconstruction, ids
 
 
-def options_of(pycolmap, a, fix):
+LONG = {"focal": "f", "distortion": "k", "principal-point": "pp"}
+
+
+def choices(a):
+    """What is held and what moves besides, by the short names."""
+    fix, refine = ({LONG.get(word, word) for word in text.split(",") if word}
+                   for text in (a.fix, a.refine))
+    known = {"points", "poses", "intrinsics", "f", "k", "pp"}
+    unknown = sorted(word for word in fix - known if not word.startswith(("camera=", "pose=")))
+    if unknown := unknown + sorted(refine - {"pp"}):
+        sys.exit(f"COLMAP here cannot hold or refine {', '.join(unknown)}")
+    if "intrinsics" in fix:
+        fix |= {"f", "k", "pp"} - refine
+    if fix & refine:
+        sys.exit("the principal point is both held and refined")
+    return fix, refine
+
+
+def options_of(pycolmap, a, fix, refine):
     solvers = {"dense": "DENSE_SCHUR", "sparse": "SPARSE_SCHUR", "iterative": "ITERATIVE_SCHUR"}
     if a.config not in solvers:
         sys.exit(f"unknown configuration '{a.config}'")
     options = pycolmap.BundleAdjustmentOptions()
-    options.refine_principal_point = False
-    options.refine_focal_length = options.refine_extra_params = "intrinsics" not in fix
+    options.refine_principal_point = "pp" in refine
+    options.refine_focal_length = "f" not in fix
+    options.refine_extra_params = "k" not in fix
     options.refine_points3D = "points" not in fix
     options.refine_rig_from_world = "poses" not in fix
     options.print_summary = False
@@ -201,24 +225,72 @@ def peak_bytes():
         return next(int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM:"))
 
 
+class BalProblem:
+    """A BAL file as COLMAP has it."""
+    def __init__(self, pycolmap, path):
+        self.path = path
+        self.observations, cameras, points = read_bal(path)
+        self.start_cost, behind = bal_cost(self.observations, cameras, points)
+        if behind:
+            sys.exit("COLMAP sets residuals behind a camera to zero: this file has some")
+        self.images = len(cameras)
+        self.reconstruction, self.points = build(pycolmap, self.observations, cameras, points)
+
+    def check_start(self, cost):
+        if abs(cost - self.start_cost) > 1e-9 * self.start_cost:
+            sys.exit(f"COLMAP's cost of the start is {cost!r}, that of the file {self.start_cost!r}")
+
+    def write(self, pycolmap, path):
+        write_bal(path, self.path, *state_of(pycolmap, self.reconstruction, self.points, self.images))
+
+
+class Model:
+    """A COLMAP model. Whoever runs this checks the cost of the start: it knows the model too."""
+    def __init__(self, pycolmap, path):
+        self.reconstruction = pycolmap.Reconstruction(path)
+        for frame in self.reconstruction.frames.values():
+            pose = frame.rig_from_world
+            quaternion = pose.rotation.quat / np.linalg.norm(pose.rotation.quat)
+            frame.rig_from_world = pycolmap.Rigid3d(pycolmap.Rotation3d(quaternion), pose.translation)
+
+    def check_start(self, cost):
+        pass
+
+    def write(self, pycolmap, path):
+        os.makedirs(path, exist_ok=True)
+        self.reconstruction.write_binary(path)
+
+
+def config_of(pycolmap, reconstruction, fix):
+    """All images, and the single cameras and poses that are held."""
+    config = pycolmap.BundleAdjustmentConfig()
+    for image_id in reconstruction.images:
+        config.add_image(image_id)
+    by_name = {image.name: image for image in reconstruction.images.values()}
+    for word in fix:
+        kind, _, who = word.partition("=")
+        if kind == "camera":
+            if not who.isdigit() or int(who) not in reconstruction.cameras:
+                sys.exit(f"COLMAP here holds cameras by id: there is no {who}")
+            config.set_constant_cam_intrinsics(int(who))
+        elif kind == "pose":
+            if who not in by_name:
+                sys.exit(f"COLMAP here holds poses by an image's whole name: there is no {who}")
+            config.set_constant_rig_from_world_pose(by_name[who].frame_id)
+    return config
+
+
 def main():
     a = parse_arguments()
-    fix = set(filter(None, a.fix.split(",")))
-    if unknown := sorted(fix - {"points", "poses", "intrinsics"}):
-        sys.exit(f"COLMAP here cannot hold {', '.join(unknown)}")
+    fix, refine = choices(a)
     import pycolmap  # after the arguments, so that --help needs no COLMAP
 
-    options = options_of(pycolmap, a, fix)
-    observations, cameras, points = read_bal(a.input)
-    start_cost, behind = bal_cost(observations, cameras, points)
-    if behind:
-        sys.exit("COLMAP sets residuals behind a camera to zero: this file has some")
-    reconstruction, point_ids = build(pycolmap, observations, cameras, points)
+    options = options_of(pycolmap, a, fix, refine)
+    problem = (Model if os.path.isdir(a.input) else BalProblem)(pycolmap, a.input)
+    reconstruction = problem.reconstruction
 
     cpu_start, start = cpu_s(), time.perf_counter()
-    config = pycolmap.BundleAdjustmentConfig()
-    for i in range(len(cameras)):
-        config.add_image(i + 1)
+    config = config_of(pycolmap, reconstruction, fix)
     adjuster = pycolmap.create_default_ceres_bundle_adjuster(options, config, reconstruction)
     setup = time.perf_counter() - start
     with tempfile.TemporaryFile("w+") as table:
@@ -228,13 +300,10 @@ def main():
         printed = table.read()
     total = time.perf_counter() - start
     cpu, peak = cpu_s() - cpu_start, peak_bytes()
-    own_start = summary.initial_cost
-    if abs(own_start - start_cost) > 1e-9 * start_cost:
-        sys.exit(f"COLMAP's cost of the start is {own_start!r}, that of the file {start_cost!r}")
-    final_cameras, final_points = state_of(pycolmap, reconstruction, point_ids, len(cameras))
+    problem.check_start(summary.initial_cost)
     if a.out:
-        write_bal(a.out, a.input, final_cameras, final_points)
-    trace = trace_of(printed, setup, own_start, summary.final_cost)
+        problem.write(pycolmap, a.out)
+    trace = trace_of(printed, setup, summary.initial_cost, summary.final_cost)
     steps = len(trace) - 1
     json.dump({
         "solver": "colmap-" + importlib.metadata.version("pycolmap"), "config": a.config,

@@ -41,6 +41,11 @@ struct Camera {
   std::uint64_t width_px = 0, height_px = 0;  ///< of its images; 0: not known
 };
 
+/// Some of a model's parameters: bit i is the i-th in their order.
+using ParameterSet = std::uint16_t;
+/// Those of the principal point: what is held unless something else is asked for.
+ParameterSet principal_point(CameraModel model);
+
 std::size_t parameter_count(CameraModel model);
 std::vector<std::string_view> parameter_names(CameraModel model);
 

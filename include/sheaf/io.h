@@ -39,15 +39,15 @@ Result<InputFile> read_file(const std::filesystem::path& path, const ReadOptions
 Result<Problem> read(const std::filesystem::path& path);
 
 struct WriteOptions {
-  /// "bal", "colmap" (binary), "colmap-text", "bundler", "nvm" or "ply"; empty: by the name, as
-  /// `write_format` tells.
+  /// "bal", "colmap" (binary), "colmap-text", "bundler", "nvm", "libmv" or "ply"; empty: by the
+  /// name, as `write_format` tells.
   std::string format;
 };
 
 /// The format that a problem is written in, by the path's name: `.ply` is a point cloud with camera
-/// frusta, `.out` Bundler, `.nvm` NVM, all before a `.gz` or `.bz2`. A folder, a name that ends in
-/// a slash and, for a problem that came from a COLMAP model, a name without extension, is a COLMAP
-/// model, in the form that was read. Anything else is BAL.
+/// frusta, `.out` Bundler, `.nvm` NVM, `.problem` libmv, all before a `.gz` or `.bz2`. A folder, a
+/// name that ends in a slash and, for a problem that came from a COLMAP model, a name without
+/// extension, is a COLMAP model, in the form that was read. Anything else is BAL.
 std::string write_format(const Problem& problem, const std::filesystem::path& path);
 
 /// Writes a problem, beside the target and then renamed over it; a trailing `.gz` or `.bz2`

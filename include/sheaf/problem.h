@@ -84,13 +84,19 @@ struct Problem {
 struct Fixed {
   bool points = false;
   bool poses = false;
+  bool intrinsics = false;                ///< all parameters of all cameras
   bool f = false;                         ///< focal lengths of all cameras
   bool k1 = false;                        ///< first radial coefficient of all cameras
   bool k2 = false;                        ///< second radial coefficient of all cameras
   std::vector<std::uint32_t> pose_ids;    ///< single poses, by image index
   std::vector<std::uint32_t> camera_ids;  ///< single lenses, all their parameters, by camera index
   std::vector<std::uint32_t> k1_ids, k2_ids;  ///< single lenses' first or second coefficient
+  /// One set for each camera, or empty: the principal points. What stands above is held besides.
+  std::vector<ParameterSet> parameters;
 };
+
+/// All that `fixed` holds of each camera.
+std::vector<ParameterSet> held_parameters(const Problem& problem, const Fixed& fixed);
 
 /// Checks sizes, index ranges, finite numbers and unit quaternions (to 1e-6); of the metadata the
 /// sizes. The message names the first offending entry.

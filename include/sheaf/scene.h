@@ -33,6 +33,19 @@ struct Scene {
 /// Errors: ErrorCode::usage when the counts cannot be met.
 Result<Scene> generate(const SceneOptions& options);
 
+/// A synthetic scene through lenses of any model. Up to 120 degrees of view the images stand around
+/// the scene and look at it; wider ones stand in its middle and look up, with points all the way to
+/// the edge of the view, behind the image plane too. docs/scenes.md says more.
+struct LensSceneOptions {
+  CameraModel model = CameraModel::opencv;
+  std::uint64_t lenses = 0;      ///< images take them in turn; 0: each has its own
+  double field_of_view_deg = 0;  ///< full angle; 0: 65 for perspective models, 200 for the others
+  SceneOptions scene{};
+};
+
+/// Images are named. Errors: ErrorCode::usage when the counts or the field of view cannot be met.
+Result<Scene> generate(const LensSceneOptions& options);
+
 /// The two kinds of scenes that the published collections of bundle adjustment come from.
 enum class SceneFamily : std::uint8_t {
   street,      ///< a car's images along streets, in order, with loops driven again

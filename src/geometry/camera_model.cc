@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/camera_model.h"
 
+#include "geometry/bal_camera.h"
+
 namespace sheaf {
 
 Projected project(const Camera& camera, const std::array<double, 3>& P) {
@@ -13,6 +15,11 @@ Projected project(const Camera& camera, const std::array<double, 3>& P) {
     lens.project(k, P.data(), J);
     return Projected{J.pixel, lens.sees(k, P.data())};
   });
+}
+
+bool sees(const Camera& camera, const std::array<double, 3>& P) {
+  return with_lens(camera.model,
+                   [&](auto lens) { return lens.sees(camera.parameters.data(), P.data()); });
 }
 
 LensJacobian<double> project_with_jacobian(const Camera& camera, const std::array<double, 3>& P) {
@@ -31,6 +38,12 @@ std::vector<std::string_view> parameter_names(CameraModel model) {
     const auto& names = decltype(lens)::kParameters;
     return std::vector<std::string_view>(names.begin(), names.end());
   });
+}
+
+ParameterSet principal_point(CameraModel model) {
+  const ParameterRoles roles = roles_of(model);
+  if (roles.cx < 0) return 0;
+  return static_cast<ParameterSet>(1u << roles.cx | 1u << roles.cy);
 }
 
 std::string_view to_string(CameraModel model) {

@@ -1,10 +1,13 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#pragma once
+#if !defined(SHEAF_GEOMETRY_EUCM_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
+#define SHEAF_GEOMETRY_EUCM_LENS_H_
 
+#ifndef SHEAF_LENSES_ON_LANES
 #include "geometry/lens.h"
+#endif
 
-namespace sheaf {
+namespace SHEAF_LENS_NAMESPACE {
 
 /// The enhanced unified camera model, u = (fx, fy) P.xy / h + c with h = alpha d + (1 - alpha) z
 /// and d = sqrt(beta |P.xy|^2 + z^2); 0 <= alpha <= 1, beta > 0. Valid where z > -w d with
@@ -43,4 +46,6 @@ struct EucmLens {
   }
 };
 
-}  // namespace sheaf
+}  // namespace SHEAF_LENS_NAMESPACE
+
+#endif  // SHEAF_GEOMETRY_EUCM_LENS_H_

@@ -1,10 +1,13 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#pragma once
+#if !defined(SHEAF_GEOMETRY_FISHEYE_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
+#define SHEAF_GEOMETRY_FISHEYE_LENS_H_
 
+#ifndef SHEAF_LENSES_ON_LANES
 #include "geometry/lens.h"
+#endif
 
-namespace sheaf {
+namespace SHEAF_LENS_NAMESPACE {
 
 /// Models of m = theta e, theta the angle from the optical axis: nothing special happens at 90
 /// degrees, and only what lies exactly backwards has no image. n = theta^2.
@@ -109,4 +112,6 @@ struct ThinPrismFisheyeLens {
   static bool sees(const double*, const double* P) { return not_backwards(P); }
 };
 
-}  // namespace sheaf
+}  // namespace SHEAF_LENS_NAMESPACE
+
+#endif  // SHEAF_GEOMETRY_FISHEYE_LENS_H_

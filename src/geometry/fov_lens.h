@@ -1,10 +1,13 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#pragma once
+#if !defined(SHEAF_GEOMETRY_FOV_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
+#define SHEAF_GEOMETRY_FOV_LENS_H_
 
+#ifndef SHEAF_LENSES_ON_LANES
 #include "geometry/lens.h"
+#endif
 
-namespace sheaf {
+namespace SHEAF_LENS_NAMESPACE {
 
 /// u = (fx, fy) g e + c with g = atan2(a r, z) / omega, a = 2 tan(omega / 2), r = |P.xy|,
 /// e = P.xy / r: one parameter for a lens that compresses its border. Valid in all directions but
@@ -67,4 +70,6 @@ struct FovLens {
   }
 };
 
-}  // namespace sheaf
+}  // namespace SHEAF_LENS_NAMESPACE
+
+#endif  // SHEAF_GEOMETRY_FOV_LENS_H_

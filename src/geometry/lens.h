@@ -1,6 +1,10 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#pragma once
+
+// For scalars in namespace sheaf; once more on lanes, for each instruction set, in the namespace
+// that residual/lens_lanes-inl.h sets: what runs there must be compiled there.
+#if !defined(SHEAF_GEOMETRY_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
+#define SHEAF_GEOMETRY_LENS_H_
 
 #include <array>
 #include <cmath>
@@ -8,7 +12,11 @@
 
 #include "sheaf/camera.h"
 
-namespace sheaf {
+#ifndef SHEAF_LENS_NAMESPACE
+#define SHEAF_LENS_NAMESPACE sheaf
+#endif
+
+namespace SHEAF_LENS_NAMESPACE {
 
 /// The parts that camera models are made of. `T` is a scalar, or lanes with the same operators,
 /// functions (sqrt, atan2, tan) and `select`: no body branches on a value.
@@ -132,4 +140,6 @@ inline void by_tangential(const T* k, int i, const OnPlane<T>& m, LensJacobian<T
   by_parameter<kFocals>(k, i + 1, n + T(2) * m.x * m.x, xy, out);
 }
 
-}  // namespace sheaf
+}  // namespace SHEAF_LENS_NAMESPACE
+
+#endif  // SHEAF_GEOMETRY_LENS_H_

@@ -1,10 +1,13 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#pragma once
+#if !defined(SHEAF_GEOMETRY_PERSPECTIVE_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
+#define SHEAF_GEOMETRY_PERSPECTIVE_LENS_H_
 
+#ifndef SHEAF_LENSES_ON_LANES
 #include "geometry/lens.h"
+#endif
 
-namespace sheaf {
+namespace SHEAF_LENS_NAMESPACE {
 
 /// Models of m = P.xy / P.z: they see less than 180 degrees. `sees` is whether P lies before the
 /// camera; the formulas continue behind it. n = |m|^2.
@@ -129,4 +132,6 @@ struct FullOpencvLens {
   static bool sees(const double*, const double* P) { return before_plane(P); }
 };
 
-}  // namespace sheaf
+}  // namespace SHEAF_LENS_NAMESPACE
+
+#endif  // SHEAF_GEOMETRY_PERSPECTIVE_LENS_H_

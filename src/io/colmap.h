@@ -33,6 +33,9 @@ Result<ColmapFiles> load_colmap(const std::filesystem::path& folder);
 /// (ids that occur twice or nowhere, tracks and features that disagree).
 Result<Problem> parse_colmap(const ColmapFiles& files);
 
+/// A sentence where frames of rigs have several images, which are solved one by one.
+std::vector<std::string> notes_on(const ColmapFiles& files);
+
 /// What a folder will hold; the files that nothing changed are, byte for byte, those that were
 /// read, where the form (binary or text) is the same. Errors: usage, for a problem that the form
 /// cannot hold.

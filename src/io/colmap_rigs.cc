@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <map>
@@ -162,6 +163,18 @@ Result<Rigs> parse_rigs(const ColmapFiles& files) {
     if (auto e = files.text ? read_frames_text(files, rigs) : read_frames_binary(files, rigs))
       return *e;
   return rigs;
+}
+
+std::vector<std::string> notes_on(const ColmapFiles& files) {
+  const Result<Rigs> rigs = parse_rigs(files);
+  if (!rigs.ok()) return {};
+  const auto& frames = rigs.value().frames;
+  const auto several = std::count_if(frames.begin(), frames.end(),
+                                     [](const RigFrame& frame) { return frame.images.size() > 1; });
+  if (several == 0) return {};
+  return {std::to_string(several) + " of " + std::to_string(frames.size()) +
+          " frames of the rigs have several images: these move one by one, not as a rig, and rigs "
+          "and frames are written only where none has moved"};
 }
 
 std::optional<std::string> frames_with_poses(const ColmapFiles& files, const Problem& problem) {

@@ -96,6 +96,7 @@ Result<InputFile> read_folder(const fs::path& path, bool hash) {
   file.format = files.value().text ? "colmap-text" : "colmap";
   file.compression = to_string(Compression::none);
   file.bytes = files.value().bytes;
+  file.notes = notes_on(files.value());
   file.read_s = seconds_since(start);
   if (!hash) return file;
   Sha256 of_all;
@@ -185,6 +186,7 @@ std::string write_format(const Problem& problem, const fs::path& path) {
   if (extension == ".ply") return "ply";
   if (extension == ".out") return "bundler";
   if (extension == ".nvm") return "nvm";
+  if (extension == ".problem") return "libmv";
   const std::string read_as =
       problem.metadata && problem.metadata->source ? problem.metadata->source->format : "";
   const bool from_colmap = read_as.starts_with("colmap");
@@ -203,12 +205,14 @@ Result<void> write(const Problem& problem, const fs::path& path, const WriteOpti
     if (format == "bal") return write_bal_file(problem, path);
     if (format == "bundler") return write_text(format_bundler(problem), path);
     if (format == "nvm") return write_text(format_nvm(problem), path);
+    if (format == "libmv") return write_text(format_libmv(problem), path);
     if (format == "ply") return write_ply_file(problem, path);
   } catch (const std::bad_alloc&) {
     return out_of_memory(path);
   }
-  return Error(ErrorCode::usage,
-               "Sheaf writes bal, colmap, colmap-text, bundler, nvm and ply, not '" + format + "'");
+  return Error(
+      ErrorCode::usage,
+      "Sheaf writes bal, colmap, colmap-text, bundler, nvm, libmv and ply, not '" + format + "'");
 }
 
 Result<OutputFile> create_output(const fs::path& path) {

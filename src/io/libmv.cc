@@ -62,8 +62,13 @@ struct Reader {
 std::optional<Error> Reader::lens() {
   std::array<double, 8> k{};
   if (auto e = floats(k, "an intrinsic parameter of the lens")) return e;
-  Camera camera{CameraModel::full_opencv, {k[0], k[0], k[1], k[2], k[3], k[4], k[6], k[7], k[5]}};
-  problem.cameras.push_back(camera);
+  // One focal length, as the file has it, where a model allows it.
+  if (k[5] == 0 && k[6] == 0 && k[7] == 0) {
+    problem.cameras.push_back({CameraModel::radial, {k[0], k[1], k[2], k[3], k[4]}});
+  } else {
+    problem.cameras.push_back(
+        {CameraModel::full_opencv, {k[0], k[0], k[1], k[2], k[3], k[4], k[6], k[7], k[5]}});
+  }
   return {};
 }
 
@@ -174,6 +179,10 @@ Result<Problem> parse_libmv(std::string_view bytes, const std::string& name,
   Problem& problem = reader.problem;
   if (const std::size_t unobserving = reader.markers.size() - problem.num_observations())
     notes.push_back(std::to_string(unobserving) + " markers are of tracks that have no point");
+  auto source = std::make_shared<SourceFiles>();
+  source->format = "libmv";
+  source->libmv_space = static_cast<char>(space);
+  reader.metadata.source = std::move(source);
   reader.metadata.state_hash = state_hash(problem);
   problem.metadata = std::make_shared<const SceneMetadata>(std::move(reader.metadata));
   return std::move(problem);

@@ -20,10 +20,14 @@ inline bool is_libmv(std::string_view head) {
          (head[1] == 'P' || head[1] == 'N');
 }
 
-/// One FULL_OPENCV lens for all images. Markers of images that have no camera are left out, with a
-/// note; those of tracks that have no point are features that nothing observes. Errors:
-/// unreadable_input, as FILE: byte N: found this, expected that.
+/// One lens for all images: RADIAL where k3, p1 and p2 are 0, else FULL_OPENCV. Markers of images
+/// that have no camera are left out, with a note; those of tracks that have no point are features
+/// that nothing observes. Errors: unreadable_input, as FILE: byte N: found this, expected that.
 Result<Problem> parse_libmv(std::string_view bytes, const std::string& name,
                             std::vector<std::string>& notes);
+
+/// Little-endian, in single precision. Errors: usage for a problem of several lenses, or one that
+/// f, cx, cy, k1, k2, k3, p1, p2 do not describe.
+Result<std::string> format_libmv(const Problem& problem);
 
 }  // namespace sheaf

@@ -68,13 +68,19 @@ Sentences lost_in(const std::string& format, const Problem& problem) {
     out.push_back("only points, colours and the cameras' places are written, in single precision");
     return out;
   }
-  add_lens_losses(problem, out);
+  if (format == "libmv") {
+    out.push_back("numbers are written in single precision");
+    if (states_sizes(problem)) out.push_back("the size of the images is not written");
+  } else {
+    add_lens_losses(problem, out);
+  }
   const std::size_t idle = idle_features(problem);
   if (idle > 0)
     out.push_back(std::to_string(idle) + " features that observe no point are not written");
+  const bool libmv = format == "libmv";
   const bool names = m && !m->image_names.empty() && format != "nvm";
-  const bool ids = m && (!m->point_ids.empty() || !m->camera_ids.empty());
-  const bool colours = m && !m->point_colours.empty() && format == "bal";
+  const bool ids = m && ((!m->point_ids.empty() && !libmv) || !m->camera_ids.empty());
+  const bool colours = m && !m->point_colours.empty() && (format == "bal" || libmv);
   const auto list = [&](bool there, const char* what) {
     if (there) out.push_back(std::string(what) + " not written");
   };

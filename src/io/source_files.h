@@ -12,7 +12,7 @@ namespace sheaf {
 
 /// What only one format can hold, kept for writing the same format again.
 struct SourceFiles {
-  std::string format;  ///< "colmap", "colmap-text", "bundler", "nvm"
+  std::string format;  ///< "colmap", "colmap-text", "bundler", "nvm", "libmv"
 
   /// COLMAP, text only: the files as they were, so that what was not changed is written as it
   /// stood, comments and number of digits included.
@@ -25,6 +25,8 @@ struct SourceFiles {
   /// NVM: the radial coefficient of each image, with which its measurements were made straight,
   /// these as they were (2 for each observation), and the images' centres.
   std::vector<double> nvm_distortion, nvm_measured, nvm_centres;
+  /// libmv: of the markers, 'P' (pixels) or 'N' (normalised).
+  char libmv_space = 'P';
 };
 
 }  // namespace sheaf

@@ -2,19 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "linear/columns.h"
 
-#include <array>
-
 namespace sheaf {
 
 Columns number_columns(const Problem& problem, const Fixed& fixed) {
   std::vector<char> pose_held(problem.num_images(), fixed.poses);
-  std::vector<char> lens_held(problem.cameras.size(), false);
   for (std::uint32_t i : fixed.pose_ids) pose_held[i] = true;
-  for (std::uint32_t i : fixed.camera_ids) lens_held[i] = true;
-  std::vector<std::array<bool, 3>> parameter_held(problem.cameras.size(),
-                                                  {fixed.f, fixed.k1, fixed.k2});
-  for (std::uint32_t i : fixed.k1_ids) parameter_held[i][1] = true;
-  for (std::uint32_t i : fixed.k2_ids) parameter_held[i][2] = true;
+  const std::vector<ParameterSet> held = held_parameters(problem, fixed);
 
   Columns out;
   out.of_image.assign(9 * problem.num_images(), Columns::kFixed);
@@ -26,9 +19,9 @@ Columns number_columns(const Problem& problem, const Fixed& fixed) {
       for (int k = 0; k < 6; ++k) columns[k] = out.count++;
     const std::uint32_t camera = problem.image_camera[i];
     std::int32_t* parameters = &lens[3 * std::size_t(camera)];
-    if (!lens_numbered[camera] && !lens_held[camera])
+    if (!lens_numbered[camera])
       for (int k = 0; k < 3; ++k)
-        if (!parameter_held[camera][k]) parameters[k] = out.count++;
+        if ((held[camera] >> k & 1) == 0) parameters[k] = out.count++;
     for (int k = 0; k < 3; ++k) {
       columns[6 + k] = parameters[k];
       out.lens_shared = out.lens_shared || (lens_numbered[camera] && parameters[k] >= 0);

@@ -116,6 +116,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
   const auto slices = static_cast<std::uint64_t>(
       count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
   Footprint sum(kCode + kThread * static_cast<std::uint64_t>(threads - 1));
+  sum.add(c.other_bytes, 1);
   add_lists(c, kind, sum);
   add_state(c, sum);
   sum.add(slices * tiles, 8 * kTileDoubles);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <limits>
 #include <vector>
 
 #include "linear/block_rows.h"
@@ -54,19 +55,6 @@ std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vec
   return tiles;
 }
 
-void count_sparse(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& c) {
-  const auto n = static_cast<double>(c.columns);
-  c.sparse_flops = n * n * n / 3;
-  c.sparse_doubles = c.columns * (c.columns + 8);
-  if (tiles.size() == c.tiles) {
-    const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
-    c.sparse_flops = symbolic.flops;
-    c.sparse_doubles = symbolic.panel_doubles;
-    c.sparse_bytes = SparseCholesky::bytes(symbolic) - 8 * symbolic.panel_doubles;
-  }
-  c.lens_shared = columns.lens_shared;
-}
-
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 
 /// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair and, spread
@@ -74,6 +62,8 @@ double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 /// product in mixed precision, 12 ns a block for an explicit one. To place a tile: a guess.
 constexpr double kPairNs = 8, kImplicitNs = 5.5, kBlockNs = 12, kPlaceNs = 200,
                  kDenseFlopsPerNs = 85;
+/// An observation's part in an implicit product through lenses of any model.
+constexpr double kLensImplicitNs = 40;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
 double iterations(const WorkCounts& c) { return c.clusters > 0 ? 15 : 25; }
@@ -111,8 +101,10 @@ double explicit_seconds(const WorkCounts& c) {
          seconds(kPlaceNs * static_cast<double>(c.tiles) + iterations(c) * kBlockNs * blocks);
 }
 double implicit_seconds(const WorkCounts& c) {
+  if (c.only_formed) return std::numeric_limits<double>::infinity();
   return coarse_seconds(c) +
-         seconds(iterations(c) * kImplicitNs * static_cast<double>(c.observations));
+         seconds(iterations(c) * (c.any_lens ? kLensImplicitNs : kImplicitNs) *
+                 static_cast<double>(c.observations));
 }
 
 /// Seconds a step.
@@ -140,6 +132,19 @@ const char* to_string(SolverKind kind) {
   return "dense";
 }
 
+void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& c) {
+  const auto n = static_cast<double>(c.columns);
+  c.sparse_flops = n * n * n / 3;
+  c.sparse_doubles = c.columns * (c.columns + 8);
+  if (tiles.size() == c.tiles) {
+    const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
+    c.sparse_flops = symbolic.flops;
+    c.sparse_doubles = symbolic.panel_doubles;
+    c.sparse_bytes = SparseCholesky::bytes(symbolic) - 8 * symbolic.panel_doubles;
+  }
+  c.lens_shared = columns.lens_shared;
+}
+
 WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
                       Clusters& clusters, Threads& threads) {
   WorkCounts c;
@@ -157,7 +162,7 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
   std::vector<Tile> tiles;
   c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles, threads)
                                                  : std::min(all, c.pairs);
-  count_sparse(columns, tiles, c);
+  count_factor(columns, tiles, c);
   c.pair_runs = estimate_pair_runs(batches, c);
   clusters = coarse_clusters(batches, columns, threads);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
@@ -175,8 +180,10 @@ Plan plan_solver(const WorkCounts& c) {
                              " blocks, " + std::to_string(c.pairs) + " pairs";
   const std::string costs = ": about " + milliseconds(dense) + " a step dense, " +
                             milliseconds(sparse) + " sparse, " + milliseconds(explicit_cg) +
-                            " iterative explicit, " + milliseconds(implicit_cg) +
-                            " iterative implicit";
+                            " iterative explicit" +
+                            (c.only_formed ? std::string()
+                                           : ", " + milliseconds(implicit_cg) +
+                                                 " iterative implicit");
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
   if (too_long)
     return {SolverKind::implicit_cg, counts + ": a point is seen " +

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "linear/chunks.h"
 #include "linear/clusters.h"
 #include "linear/columns.h"
 #include "platform/parallel.h"
@@ -35,6 +37,9 @@ struct WorkCounts {
   bool images_couple = true;  ///< some free point or shared lens couples images
   bool weighted = false;      ///< a loss leaves a weight for each observation
   bool dogleg = false;        ///< the gradient is summed by image, steps are blended
+  bool only_formed = false;   ///< there is no implicit product
+  bool any_lens = false;      ///< lenses of any model: implicit products are dearer, and double
+  std::uint64_t other_bytes = 0;  ///< held besides
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
@@ -42,6 +47,9 @@ struct WorkCounts {
 /// Also finds the clusters of the coarse space.
 WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
                       Clusters& clusters, Threads& threads);
+
+/// Sets what depends on the factor of the formed matrix.
+void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& counts);
 
 /// A solver and, in one line, why it was taken.
 struct Plan {

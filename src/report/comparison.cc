@@ -57,6 +57,7 @@ std::string what_moved(const Problem& before, const Problem& after, const Fixed&
   if (fixed.points &&
       !std::equal(before.points.begin(), before.points.end(), after.points.begin(), same))
     return "points";
+  const std::vector<ParameterSet> held = held_parameters(before, fixed);
   for (std::size_t i = 0; i < before.num_images(); ++i) {
     const Pose &a = before.poses[i], &b = after.poses[i];
     const double size = std::hypot(a.translation[0], a.translation[1], a.translation[2]);
@@ -68,11 +69,11 @@ std::string what_moved(const Problem& before, const Problem& after, const Fixed&
     if (!stays && (fixed.poses || listed(fixed.pose_ids, i))) return "poses";
     const auto &own = before.cameras[before.image_camera[i]].parameters,
                &other = after.cameras[after.image_camera[i]].parameters;
-    const bool whole = listed(fixed.camera_ids, before.image_camera[i]);
-    const bool held[3] = {fixed.f, fixed.k1, fixed.k2};
-    const char* const names[3] = {"f", "k1", "k2"};
-    for (int j = 0; j < 3; ++j)
-      if ((held[j] || whole) && !same(own[j], other[j])) return names[j];
+    const CameraModel model = before.cameras[before.image_camera[i]].model;
+    const ParameterSet set = held[before.image_camera[i]];
+    const std::vector<std::string_view> names = parameter_names(model);
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if ((set >> k & 1) != 0 && !same(own[k], other[k])) return std::string(names[k]);
   }
   return "";
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/behind.h"
 
+#include "geometry/camera_model.h"
 #include "geometry/rotation.h"
 #include "platform/parallel.h"
 
@@ -19,8 +20,9 @@ std::vector<std::uint64_t> behind_camera(const Problem& problem, Threads& thread
     for (; i < end; ++i) {
       const std::uint32_t image = problem.observation_image[i];
       const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
-      const Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
-      if (P[2] + problem.poses[image].translation[2] > 0) behind.push_back(i);
+      Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
+      for (std::size_t k = 0; k < 3; ++k) P[k] += problem.poses[image].translation[k];
+      if (!sees(problem.cameras[problem.image_camera[image]], P)) behind.push_back(i);
     }
   });
   std::vector<std::uint64_t> all;

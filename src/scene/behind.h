@@ -11,7 +11,8 @@ namespace sheaf {
 
 class Threads;
 
-/// Observations whose point lies behind the camera, in order: as `evaluate` lists them.
+/// Observations whose point lies behind the camera, or beyond what a wide lens sees, in order: as
+/// `evaluate` lists them.
 std::vector<std::uint64_t> behind_camera(const Problem& problem, Threads& threads);
 
 }  // namespace sheaf

@@ -12,6 +12,7 @@
 #include "platform/random.h"
 #include "scene/lakeside.h"
 #include "scene/portable_rotation.h"
+#include "scene/scene_checks.h"
 #include "scene/track_lengths.h"
 #include "sheaf/scene.h"
 
@@ -22,26 +23,6 @@ constexpr std::uint32_t kFewestObservations = 10;  // per image, where the count
 
 // Streams of the seed: another amount of one noise leaves everything else as it is.
 enum Stream : std::uint64_t { kTracks = 2, kLengths = 3, kPixels = 4, kCameras = 5, kPoints = 6 };
-
-Result<void> check(const SceneOptions& o) {
-  const auto refuse = [](const std::string& message) { return Error(ErrorCode::usage, message); };
-  if (o.images < 2 || o.images >= UINT32_MAX)
-    return refuse("a scene needs from 2 to 2^32 - 2 images, not " + std::to_string(o.images));
-  if (o.points < 1 || o.points >= UINT32_MAX)
-    return refuse("a scene needs from 1 to 2^32 - 2 points, not " + std::to_string(o.points));
-  if (!(o.mean_track >= 2 && o.mean_track <= static_cast<double>(o.images)))
-    return refuse("the mean track must be from 2 to the number of images, " +
-                  std::to_string(o.images) + ", not " + std::to_string(o.mean_track));
-  const std::pair<const char*, double> noises[] = {{"pixel noise", o.pixel_noise_px},
-                                                   {"rotation noise", o.rotation_noise_rad},
-                                                   {"center noise", o.center_noise},
-                                                   {"point noise", o.point_noise},
-                                                   {"focal noise", o.focal_noise}};
-  for (const auto& [name, value] : noises)
-    if (!(value >= 0) || !std::isfinite(value))
-      return refuse(std::string("the ") + name + " must be a finite number from 0 up");
-  return {};
-}
 
 // Which images see which point: point i has images[begin[i]] ... images[begin[i + 1]), ascending.
 struct Tracks {
@@ -214,8 +195,28 @@ void disturb(Problem& start, const Lakeside& lakeside, const SceneOptions& optio
 
 }  // namespace
 
+Result<void> check_scene(const SceneOptions& o) {
+  const auto refuse = [](const std::string& message) { return Error(ErrorCode::usage, message); };
+  if (o.images < 2 || o.images >= UINT32_MAX)
+    return refuse("a scene needs from 2 to 2^32 - 2 images, not " + std::to_string(o.images));
+  if (o.points < 1 || o.points >= UINT32_MAX)
+    return refuse("a scene needs from 1 to 2^32 - 2 points, not " + std::to_string(o.points));
+  if (!(o.mean_track >= 2 && o.mean_track <= static_cast<double>(o.images)))
+    return refuse("the mean track must be from 2 to the number of images, " +
+                  std::to_string(o.images) + ", not " + std::to_string(o.mean_track));
+  const std::pair<const char*, double> noises[] = {{"pixel noise", o.pixel_noise_px},
+                                                   {"rotation noise", o.rotation_noise_rad},
+                                                   {"center noise", o.center_noise},
+                                                   {"point noise", o.point_noise},
+                                                   {"focal noise", o.focal_noise}};
+  for (const auto& [name, value] : noises)
+    if (!(value >= 0) || !std::isfinite(value))
+      return refuse(std::string("the ") + name + " must be a finite number from 0 up");
+  return {};
+}
+
 Result<Scene> generate(const SceneOptions& options) {
-  if (Result<void> result = check(options); !result.ok()) return result.error();
+  if (Result<void> result = check_scene(options); !result.ok()) return result.error();
   const Lakeside lakeside(static_cast<std::uint32_t>(options.images), options.seed);
   Tracks tracks = make_tracks(options, lakeside);
   even_out(tracks, lakeside);

@@ -173,6 +173,26 @@ Evaluation evaluate(const Problem& problem) {
   return out;
 }
 
+std::vector<ParameterSet> held_parameters(const Problem& problem, const Fixed& fixed) {
+  const auto bit = [](int i) { return static_cast<ParameterSet>(i < 0 ? 0u : 1u << i); };
+  constexpr ParameterSet kAll = 0xffff;
+  std::vector<ParameterSet> held;
+  std::vector<ParameterRoles> roles;
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    const CameraModel model = problem.cameras[c].model;
+    const ParameterRoles& role = roles.emplace_back(roles_of(model));
+    ParameterSet set = fixed.parameters.empty() ? principal_point(model) : fixed.parameters[c];
+    if (fixed.f) set |= bit(role.fx) | bit(role.fy);
+    if (fixed.k1) set |= bit(role.k1);
+    if (fixed.k2) set |= bit(role.k2);
+    held.push_back(fixed.intrinsics ? kAll : set);
+  }
+  for (std::uint32_t c : fixed.camera_ids) held[c] = kAll;
+  for (std::uint32_t c : fixed.k1_ids) held[c] |= bit(roles[c].k1);
+  for (std::uint32_t c : fixed.k2_ids) held[c] |= bit(roles[c].k2);
+  return held;
+}
+
 std::uint64_t state_hash(const Problem& problem) {
   std::uint64_t hash = 0x9e3779b97f4a7c15u;
   const auto mix = [&hash](std::uint64_t word) {

@@ -2,35 +2,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "solve/bal_view.h"
 
-#include <string>
-
+#include "geometry/camera_model.h"
 #include "scene/camera_frame.h"
 
 namespace sheaf {
 
-Result<void> BalView::check(const Problem& problem) {
+bool BalView::serves(const Problem& problem, const Fixed& fixed) {
+  const std::vector<ParameterSet> held = held_parameters(problem, fixed);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const auto view = radial_view(problem.cameras[c]);
-    if (view && view->refinable) continue;
-    return Error(ErrorCode::usage,
-                 "camera " + std::to_string(c) + " is " +
-                     std::string(to_string(problem.cameras[c].model)) +
-                     ": solve refines BAL, SIMPLE_PINHOLE, SIMPLE_RADIAL and RADIAL cameras; the "
-                     "other models can be read, converted and evaluated");
+    const ParameterSet principal = principal_point(problem.cameras[c].model);
+    if (!view || !view->refinable || (held[c] & principal) != principal) return false;
   }
-  return {};
+  return true;
 }
 
 BalView::BalView(Problem& problem, Fixed& fixed) : problem_(problem) {
   if (has_only_bal_cameras(problem)) return;
   cameras_ = problem.cameras;
   xy_ = problem.observation_xy;
-  for (std::uint32_t c = 0; c < cameras_.size(); ++c) {
-    const RadialView view = *radial_view(cameras_[c]);
-    if (!view.has_k1) fixed.k1_ids.push_back(c);
-    if (!view.has_k2) fixed.k2_ids.push_back(c);
+  std::vector<ParameterSet> held = held_parameters(problem, fixed);
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const ParameterRoles role = roles_of(cameras_[c].model);
+    ParameterSet of_bal = 0;
+    int to = 0;
+    for (int from : {role.fx, role.k1, role.k2}) {
+      const bool free = from >= 0 && (held[c] >> from & 1) == 0;
+      of_bal = static_cast<ParameterSet>(of_bal | (free ? 0 : 1) << to++);
+    }
+    held[c] = of_bal;
   }
   turned_ = to_bal_cameras(problem).ok();
+  if (turned_) fixed.parameters = std::move(held);
 }
 
 BalView::~BalView() {

@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "sheaf/error.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -15,9 +14,10 @@ namespace sheaf {
 /// meanwhile (by the principal point), and those come back as they were.
 class BalView {
  public:
-  /// Adds to `fixed` what the models do not have. Errors: usage, naming the first camera that is
-  /// beyond BAL's formula; the problem is then as it was.
-  static Result<void> check(const Problem& problem);
+  /// Whether BAL's formula describes all cameras and what is to be refined of them.
+  static bool serves(const Problem& problem, const Fixed& fixed);
+  /// The problem must be one that it serves. Sets Fixed::parameters to what is held of the BAL
+  /// cameras: what the models do not have too.
   BalView(Problem& problem, Fixed& fixed);
   ~BalView();
   BalView(const BalView&) = delete;

@@ -8,6 +8,8 @@
 #include "linear/chunks.h"
 #include "linear/forecast.h"
 #include "linear/image_system.h"
+#include "linear/lens_plan.h"
+#include "platform/memory.h"
 
 namespace sheaf {
 namespace {
@@ -38,7 +40,8 @@ bool loses_parallax(SolverKind kind, PointParametrisation points) {
   return kind == SolverKind::implicit_cg && points != PointParametrisation::xyz;
 }
 
-bool takes_mixed(SolverKind kind, const SolveOptions& options) {
+bool takes_mixed(SolverKind kind, const WorkCounts& counts, const SolveOptions& options) {
+  if (counts.any_lens && kind == SolverKind::implicit_cg) return false;
   switch (options.precision) {
     case Precision::full:
       return false;
@@ -90,13 +93,14 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   const auto forecast = [&](const Plan& plan) {
     return std::max(held.peak_bytes, held.resident_bytes + forecast_bytes(counts, plan, threads));
   };
-  choice.plan.mixed = takes_mixed(choice.plan.kind, options);
+  choice.plan.mixed = takes_mixed(choice.plan.kind, counts, options);
   choice.forecast_bytes = forecast(choice.plan);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
-  Plan leanest{SolverKind::implicit_cg, "", takes_mixed(SolverKind::implicit_cg, options)};
+  Plan leanest{SolverKind::implicit_cg, "", takes_mixed(SolverKind::implicit_cg, counts, options)};
   const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
+      !counts.only_formed &&
       lean <= options.memory_limit_bytes) {
     leanest.reason = std::string(to_string(choice.plan.kind)) + " would need " +
                      megabytes(choice.forecast_bytes) + ", over the limit of " +
@@ -107,9 +111,47 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   }
   return over_memory_limit(
       choice.forecast_bytes, options.memory_limit_bytes,
-      lean < choice.forecast_bytes
+      lean < choice.forecast_bytes && !counts.only_formed
           ? " (the leanest solver, iterative-implicit, needs " + megabytes(lean) + ")"
           : "");
+}
+
+Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const SolveOptions& options,
+                                     Threads& threads) {
+  const bool held = options.fixed.points;
+  Clusters clusters;
+  WorkCounts counts = estimate_lens_work(arranged, held, clusters, threads);
+  counts.weighted = options.loss.kind != LossKind::none;
+  const Batches& batches = arranged.batches;
+  const LensTracks& tracks = arranged.tracks;
+  SolveOptions implicit = options;
+  implicit.solver = CameraSolverKind::iterative_implicit;
+  std::string reason = asked_for(counts, options.solver).reason;
+  LensChoice out;
+  // Points that are held make no pairs: to form the matrix is then next to nothing.
+  if (held || asked_for(counts, options.solver).kind != SolverKind::implicit_cg) {
+    out.chunks = cut_lens_chunks(batches, tracks, !held, threads);
+    const std::uint64_t resident = resident_bytes() - listed_bytes(out.chunks);
+    counts = count_lens_work(arranged, out.chunks, counts);
+    Result<Choice> formed =
+        choose_solver(counts, options, threads.count(), {resident, peak_resident_bytes()});
+    if (formed.ok()) {
+      out.choice = std::move(formed).value();
+      out.choice.plan.clusters = std::move(clusters);
+      return out;
+    }
+    if (options.solver != CameraSolverKind::automatic) return formed.error();
+    reason = formed.error().what();
+  }
+  out.chunks = {};
+  const MemoryHeld memory{resident_bytes(), peak_resident_bytes()};
+  Result<Choice> last = choose_solver(counts, implicit, threads.count(), memory);
+  if (!last.ok()) return last.error();
+  out.chunks = cut_lens_chunks(batches, tracks, false, threads);
+  out.choice = std::move(last).value();
+  out.choice.plan.reason = std::move(reason);
+  out.choice.plan.clusters = std::move(clusters);
+  return out;
 }
 
 }  // namespace sheaf

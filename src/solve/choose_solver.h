@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "linear/lens_system.h"
 #include "linear/plan.h"
 #include "sheaf/error.h"
 #include "sheaf/options.h"
@@ -32,5 +33,13 @@ Error over_memory_limit(std::uint64_t needed, std::uint64_t limit, const std::st
 /// Points held and no lens shared: each image by itself. `batches`: count_image_batches.
 Result<Choice> choose_for_images(const Columns& columns, std::uint64_t batches,
                                  const SolveOptions& options, const MemoryHeld& held);
+
+/// Lenses of any model: pairs are listed where the matrix is to be formed.
+struct LensChoice {
+  Choice choice;
+  LensChunks chunks;
+};
+Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const SolveOptions& options,
+                                     Threads& threads);
 
 }  // namespace sheaf

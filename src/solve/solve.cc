@@ -10,6 +10,7 @@
 #include "linear/bundle_system.h"
 #include "linear/image_system.h"
 #include "linear/kernel_table.h"
+#include "linear/lens_system.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "residual/lent_observations.h"
@@ -52,7 +53,6 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 
 Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
-  if (Result<void> known = BalView::check(problem); !known.ok()) return known;
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   for (std::uint32_t i : options.fixed.pose_ids)
     if (i >= problem.num_images())
@@ -63,6 +63,10 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
       if (i >= problem.cameras.size())
         return usage("fixed camera " + std::to_string(i) + " is not one of the " +
                      std::to_string(problem.cameras.size()) + " cameras");
+  if (const std::size_t sets = options.fixed.parameters.size();
+      sets > 0 && sets != problem.cameras.size())
+    return usage("fixed parameters are given for " + std::to_string(sets) + " of " +
+                 std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (options.max_iterations < 0) return usage("max_iterations is negative");
   if (options.inner_iterations < 0) return usage("inner_iterations is negative");
@@ -143,16 +147,54 @@ Result<void> refine_images(Problem& problem, const SolveOptions& options, const 
   return {};
 }
 
+/// Observations to leave out: 1 for each.
+std::vector<std::uint8_t> held_out(const Problem& problem, const SolveOptions& options,
+                                   Threads& threads, Summary& summary) {
+  std::vector<std::uint8_t> skip;
+  if (options.cheirality != Cheirality::hold_out) return skip;
+  summary.rejected_observations = behind_camera(problem, threads);
+  skip.assign(problem.num_observations(), 0);
+  for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
+  return skip;
+}
+
+/// Lenses of any model.
+Result<void> refine_lenses(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+                           const Stopwatch& clock, Summary& summary) {
+  const auto refused = [](const char* what) {
+    return Error(ErrorCode::usage,
+                 std::string(what) +
+                     " is for BAL, SIMPLE_PINHOLE, SIMPLE_RADIAL and RADIAL cameras with their "
+                     "principal points held");
+  };
+  if (options.trust_region == TrustRegion::dogleg) return refused("the dogleg");
+  if (options.points != PointParametrisation::xyz)
+    return refused("a parametrisation of points other than X, Y, Z");
+  Threads threads(options.threads);
+  const std::vector<std::uint8_t> skip = held_out(problem, options, threads, summary);
+  const Result<LensArrangement> arranged =
+      arrange_with_lenses(problem, options.fixed, skip, threads);
+  if (!arranged.ok()) return arranged.error();
+  Result<LensChoice> chosen = choose_for_lenses(arranged.value(), options, threads);
+  if (!chosen.ok()) return chosen.error();
+  const Choice& choice = chosen.value().choice;
+  tell(choice, options, kernels, threads, summary);
+  const LensRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
+                        options.inner_iterations};
+  LensSystem system(problem, arranged.value(), std::move(chosen.value().chunks), rules, choice.plan,
+                    kernels, threads);
+  summary.behind_camera_before = behind_camera(problem, threads);
+  run(system, problem, options, clock, summary);
+  summary.solve_s = clock.seconds() - summary.setup_s;
+  summary.behind_camera_after = behind_camera(problem, threads);
+  return {};
+}
+
 /// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
 Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
                     const Stopwatch& clock, Summary& summary) {
-  std::vector<std::uint8_t> skip;
   Threads threads(options.threads);
-  if (options.cheirality == Cheirality::hold_out) {
-    summary.rejected_observations = behind_camera(problem, threads);
-    skip.assign(problem.num_observations(), 0);
-    for (std::uint64_t i : summary.rejected_observations) skip[i] = 1;
-  }
+  const std::vector<std::uint8_t> skip = held_out(problem, options, threads, summary);
   Columns columns = number_columns(problem, options.fixed);
   const bool only_images = options.fixed.points && !columns.lens_shared &&
                            options.trust_region == TrustRegion::lm &&
@@ -208,10 +250,15 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   try {
-    SolveOptions resolved = options;
-    const BalView view(problem, resolved.fixed);
-    if (Result<void> done = refine(problem, resolved, *kernels.value(), clock, summary); !done.ok())
-      return done.error();
+    Result<void> done;
+    if (BalView::serves(problem, options.fixed)) {
+      SolveOptions resolved = options;
+      const BalView view(problem, resolved.fixed);
+      done = refine(problem, resolved, *kernels.value(), clock, summary);
+    } else {
+      done = refine_lenses(problem, options, *kernels.value(), clock, summary);
+    }
+    if (!done.ok()) return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
   }

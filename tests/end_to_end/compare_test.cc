@@ -166,6 +166,42 @@ TEST_F(CompareCommand, HoldsWhatIsFixedAndShowsTheSteps) {
   EXPECT_EQ(run({"compare", "in.txt", "--fix", "nonsense"}).exit_code, 2);
 }
 
+/// A COLMAP model is compared as it is, with the lens that its images share.
+TEST_F(CompareCommand, AModelKeepsItsSharedLens) {
+  ASSERT_EQ(run({"generate", "model", "--camera", "SIMPLE_RADIAL", "--shared", "--points", "300"})
+                .exit_code,
+            0);
+  const double cost = evaluate(read(folder_ / "model").value()).cost;
+  const auto copies = [&](const std::string& name, double start) {
+    add_peer(name,
+             "cp -r \"$1\" \"$out\"\necho '{\"setup_s\": 0, \"total_s\": 1, \"trace\": [[0, " +
+                 json(start).dump() +
+                 "]], \"cpu_percent\": 1, \"peak_bytes\": 1, \"final_cost\": " +
+                 json(start).dump() + "}'");
+  };
+  copies("colmap-9", cost);
+  copies("colmap-other", 2 * cost);
+  add_honest_peer("abacus", cost);
+  const Outcome outcome = run({"compare", "model", "--solvers", "sheaf,colmap,abacus", "--peers",
+                               "peers", "--json", "c.json", "--fix", "pose=image-000003.png"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json document = json_of(folder_ / "c.json");
+  EXPECT_EQ(document["problem"]["cameras"], 1);
+  const json& own = run_of(document, "sheaf");
+  EXPECT_TRUE(own["failed"].is_null()) << own["failed"];
+  EXPECT_EQ(own["agrees"], true);
+  EXPECT_LT(own["final_cost_independent"], 0.1 * cost);
+  EXPECT_NEAR(run_of(document, "colmap-9")["final_cost_independent"].get<double>(), cost,
+              1e-12 * cost);
+  const auto failure = [&](const char* name) {
+    const json& words = run_of(document, name)["failed"];
+    return words.is_string() ? words.get<std::string>() : "";
+  };
+  EXPECT_NE(failure("colmap-other").find("it solves another problem"), std::string::npos);
+  EXPECT_NE(failure("abacus").find("--own-lenses"), std::string::npos);
+  EXPECT_EQ(run({"compare", "model", "--solvers", "sheaf", "--fix", "pose=nobody"}).exit_code, 2);
+}
+
 TEST_F(CompareCommand, NamesWhatIsMissingAndHowToInstallIt) {
   const Outcome outcome = run({"compare", "in.txt", "--solvers", "sheaf,ceres,g2o,gtsam,magic",
                                "--peers", "peers", "--json", "c.json"});

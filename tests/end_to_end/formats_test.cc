@@ -100,7 +100,10 @@ TEST_F(FormatsCommand, PerturbsAndComparesModels) {
   const Outcome compared =
       run({"compare", "start", "--solvers", "sheaf", "--peers", "/nowhere", "--json", "c.json"});
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
-  EXPECT_NE(compared.err.find("as a BAL file states it"), std::string::npos);
+  EXPECT_EQ(compared.err.find("as a BAL file states it"), std::string::npos);
+  const Outcome own = run({"compare", "start", "--solvers", "sheaf", "--own-lenses"});
+  EXPECT_EQ(own.exit_code, 0) << own.err;
+  EXPECT_NE(own.err.find("as a BAL file states it"), std::string::npos);
   EXPECT_EQ(json_of(folder_ / "c.json")["runs"].size(), 1u);
 }
 
@@ -119,9 +122,10 @@ TEST_F(FormatsCommand, RefusesWithTheRightExitCodes) {
     camera = {CameraModel::opencv_fisheye, {500, 500, 320, 240, 0, 0, 0, 0}, 640, 480};
   write(wide, folder_ / "wide/").value();
   EXPECT_EQ(run({"info", "wide"}).exit_code, 0);
-  const Outcome solved = run({"solve", "wide"});
-  EXPECT_EQ(solved.exit_code, 2);
-  EXPECT_NE(solved.err.find("camera 0 is OPENCV_FISHEYE: solve refines BAL"), std::string::npos);
+  EXPECT_EQ(run({"solve", "wide", "-o", "refined/"}).exit_code, 0);
+  const Outcome refused = run({"solve", "wide", "--trust-region", "dogleg"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("the dogleg is for BAL"), std::string::npos) << refused.err;
 }
 
 }  // namespace

@@ -24,7 +24,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "generate")
     options.insert({"--truth", "--like", "--family", "--outliers", "--drift", "--photometric",
                     "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
-                    "--occluder", "--start", "--measured"});
+                    "--occluder", "--start", "--measured", "--camera", "--shared", "--lenses",
+                    "--field-of-view"});
   if (verb == "photometric")
     options.insert({"--output",
                     "--intrinsics",
@@ -64,7 +65,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
-                    "--time-to", "--runs", "--plot"});
+                    "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
@@ -76,9 +77,9 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--min-depth"});
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--loss", "--cheirality", "--points", "--fix", "--solver", "--memory-limit",
-                    "--trust-region", "--initial-damping", "--inner-iterations", "--simd",
-                    "--precision"});
+                    "--loss", "--cheirality", "--points", "--fix", "--refine", "--solver",
+                    "--memory-limit", "--trust-region", "--initial-damping", "--inner-iterations",
+                    "--simd", "--precision"});
   return options;
 }
 

@@ -200,6 +200,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"cheirality", "reject"},
                                 {"points", "xyz"},
                                 {"fix", {"k1", "pose=0"}},
+                                {"refine", json::array()},
                                 {"precision", "double"},
                                 {"solver", "dense"},
                                 {"memory_limit_bytes", 0},

@@ -4,6 +4,7 @@
 // Bundler, NVM and libmv: small files made here, and the real ones where they are.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 
@@ -246,6 +247,54 @@ TEST(Libmv, ReadsItsBinaryEitherWayRound) {
   EXPECT_TRUE(same_state(parse_libmv(other, "f", notes).value(), p));
 }
 
+/// What `libmv_bytes` holds, less the markers that observe nothing.
+TEST(Libmv, ComesBack) {
+  Notes notes;
+  const Problem p = parse_libmv(libmv_bytes(), "f", notes).value();
+  const std::string bytes = format_libmv(p).value();
+  EXPECT_EQ(bytes.substr(0, 34), libmv_bytes().substr(0, 34));
+  notes.clear();
+  const Problem again = parse_libmv(bytes, "f", notes).value();
+  EXPECT_TRUE(notes.empty());
+  EXPECT_TRUE(same_state(again, p));
+  EXPECT_EQ(again.metadata->image_ids, p.metadata->image_ids);
+  EXPECT_EQ(again.metadata->point_ids, p.metadata->point_ids);
+  EXPECT_EQ(format_libmv(again).value(), bytes);
+  const auto lost = lost_in("libmv", p);
+  EXPECT_NE(std::find(lost.begin(), lost.end(), "numbers are written in single precision"),
+            lost.end());
+}
+
+TEST(Libmv, HoldsOneLensOfItsFormulaAndRefusesOthers) {
+  Notes notes;
+  for (const Camera& camera :
+       {Camera{CameraModel::simple_pinhole, {500, 320, 240}},
+        Camera{CameraModel::pinhole, {500, 500, 320, 240}},
+        Camera{CameraModel::simple_radial, {500, 320, 240, 0.01}},
+        Camera{CameraModel::radial, {500, 320, 240, 0.01, 0.02}},
+        Camera{CameraModel::opencv, {500, 500, 320, 240, 0.01, 0.02, 1e-3, 2e-3}},
+        Camera{CameraModel::full_opencv, {500, 500, 320, 240, 0.01, 0.02, 1e-3, 2e-3, 3e-3}}}) {
+    const Problem problem = seen_by({camera}, 3, 6, 5);
+    const Result<std::string> written = format_libmv(problem);
+    ASSERT_TRUE(written.ok()) << written.error().what();
+    const Problem again = parse_libmv(written.value(), "f", notes).value();
+    EXPECT_LT(evaluate(again).rms_px, 1e-3) << to_string(camera.model);  // single precision
+    EXPECT_EQ(again.cameras[0].model == CameraModel::radial, camera.parameters[6] == 0)
+        << to_string(camera.model);
+  }
+  const auto complaint = [](const Problem& problem) {
+    const Result<std::string> refused = format_libmv(problem);
+    EXPECT_FALSE(refused.ok());
+    return refused.ok() ? "" : std::string(refused.error().what());
+  };
+  const Camera pinhole{CameraModel::pinhole, {500, 501, 320, 240}};
+  EXPECT_NE(complaint(seen_by({pinhole}, 3, 6, 5)).find("fy = 501"), std::string::npos);
+  EXPECT_NE(complaint(seen_by({pinhole, pinhole}, 3, 6, 5)).find("there are 2"), std::string::npos);
+  const Camera fisheye{CameraModel::simple_radial_fisheye, {500, 320, 240, 0.01}};
+  EXPECT_NE(complaint(seen_by({fisheye}, 3, 6, 5)).find("SIMPLE_RADIAL_FISHEYE"),
+            std::string::npos);
+}
+
 TEST(Libmv, BrokenFilesAreRefusedWithTheirByte) {
   Notes notes;
   const std::string good = libmv_bytes();
@@ -300,6 +349,11 @@ TEST(FormatsData, RealFilesAreRead) {
   EXPECT_EQ(libmv.num_images(), 333u);
   EXPECT_EQ(libmv.num_points(), 26u);
   EXPECT_LT(evaluate(libmv).rms_px, 1.5);
+  Notes notes;
+  const std::string written = format_libmv(libmv).value();
+  const Problem again = parse_libmv(written, "f", notes).value();
+  EXPECT_TRUE(same_state(again, libmv));
+  EXPECT_EQ(format_libmv(again).value(), written);
 }
 
 }  // namespace

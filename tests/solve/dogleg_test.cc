@@ -174,7 +174,9 @@ Eigen::VectorXd step_between(const Problem& from, const Problem& to, const Place
     for (int k = 0; k < 3; ++k) put(at.pose[6 * i + 3 + k], phi[k]);
   }
   for (std::size_t i = 0; i < at.lens.size(); ++i)
-    put(at.lens[i], to.cameras[i / 3].parameters[i % 3] - from.cameras[i / 3].parameters[i % 3]);
+    put(at.lens[i],
+        to.cameras[i / kMaxCameraParameters].parameters[i % kMaxCameraParameters] -
+            from.cameras[i / kMaxCameraParameters].parameters[i % kMaxCameraParameters]);
   for (std::size_t i = 0; i < at.point.size(); ++i) put(at.point[i], to.points[i] - from.points[i]);
   return s;
 }

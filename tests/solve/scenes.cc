@@ -9,7 +9,7 @@
 #include <functional>
 #include <numbers>
 
-#include "geometry/bal_camera.h"
+#include "geometry/camera_model.h"
 #include "geometry/rigid_motion.h"
 #include "platform/random.h"
 
@@ -59,8 +59,8 @@ Vector3<double> in_camera(const Problem& problem, std::size_t i) {
 }
 
 std::array<double, 2> pixel_of(const Problem& problem, std::size_t i) {
-  const auto& k = problem.cameras[problem.image_camera[problem.observation_image[i]]].parameters;
-  return project(BalCamera<double>{k[0], k[1], k[2]}, in_camera(problem, i));
+  const Camera& camera = problem.cameras[problem.image_camera[problem.observation_image[i]]];
+  return project(camera, in_camera(problem, i)).pixel;
 }
 
 bool listed(const std::vector<std::uint32_t>& ids, std::size_t i) {
@@ -88,11 +88,11 @@ Scene shared_lens_scene(std::uint32_t together, bool keep_unused) {
   for (std::size_t i = 0; i < truth.num_observations(); ++i) {
     const std::uint32_t image = truth.observation_image[i];
     const double* X = &truth.points[3 * std::size_t(truth.observation_point[i])];
-    const auto& k = truth.cameras[truth.image_camera[image]].parameters;
+    const Camera& camera = truth.cameras[truth.image_camera[image]];
     const auto R = matrix_from_quaternion(truth.poses[image].rotation);
     Vector3<double> P = multiply(R, Vector3<double>{X[0], X[1], X[2]});
     for (int j = 0; j < 3; ++j) P[j] += truth.poses[image].translation[j];
-    const auto pixel = project(BalCamera<double>{k[0], k[1], k[2]}, P);
+    const auto pixel = project(camera, P).pixel;
     for (int j = 0; j < 2; ++j) {  // the noise stays, the pixel moves
       const double moved = pixel[j] - truth.observation_xy[2 * i + j];
       truth.observation_xy[2 * i + j] += moved;
@@ -160,10 +160,10 @@ double scaled_gradient(const Problem& problem, const Fixed& fixed, std::size_t p
   };
   for (std::size_t i = 0; i < problem.num_images(); ++i)
     for (int k = 0; k < 6 && !fixed.poses && !listed(fixed.pose_ids, i); ++k) take(pose_move(i, k));
-  const bool held[3] = {fixed.f, fixed.k1, fixed.k2};
+  const std::vector<ParameterSet> held = held_parameters(problem, fixed);
   for (std::size_t i = 0; i < problem.cameras.size(); ++i)
-    for (int k = 0; k < 3; ++k)
-      if (!held[k] && !listed(fixed.camera_ids, i))
+    for (std::size_t k = 0; k < parameter_count(problem.cameras[i].model); ++k)
+      if ((held[i] >> k & 1) == 0)
         take([=](Problem& p, double x) { p.cameras[i].parameters[k] += x; });
   for (std::size_t i = 0; i < std::min(3 * points, problem.points.size()) && !fixed.points; ++i)
     take([=](Problem& p, double x) { p.points[i] += x; });

@@ -16,54 +16,6 @@
 namespace sheaf {
 namespace {
 
-void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
-                          const Loss& loss = {},
-                          PointParametrisation points = PointParametrisation::xyz) {
-  const Places at(start, fixed);
-  const Charts charts(start, points);
-  const ScaledLoss scaled{loss.kind, loss.scale_px};
-  const Normal normal(start, at, scaled, charts);
-  const std::size_t n = normal.b.size();
-  std::vector<double> A = normal.A, D(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    D[i] = damping * std::clamp(A[i * n + i], 1e-6, 1e32);
-    A[i * n + i] += D[i];
-  }
-  const std::vector<double> x = solve_dense(A, normal.b);
-  double linear = 0, quadratic = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    linear += normal.b[i] * x[i];
-    for (std::size_t j = 0; j < n; ++j) quadratic += x[i] * normal.A[i * n + j] * x[j];
-  }
-  const double predicted = linear - quadratic / 2;  // by definition: cost - 1/2 |r + J x|^2
-  Problem stepped = start;
-  move(stepped, at, x, charts);
-  const double trial = robust_cost(stepped, scaled);
-
-  Problem problem = start;
-  SolveOptions options;
-  options.fixed = fixed;
-  options.initial_damping = damping;
-  options.loss = loss;
-  options.points = points;
-  options.inner_iterations = 0;  // the textbook has none
-  options.max_iterations = 1;
-  options.gradient_tolerance = 0;
-  const Summary s = solve(problem, options);
-  ASSERT_EQ(s.iterations.size(), 2u);
-  const Iteration& it = s.iterations[1];
-  EXPECT_NEAR(s.initial_cost, normal.cost, 1e-12 * normal.cost);
-  EXPECT_NEAR(it.trial_cost, trial, 1e-7 * trial);
-  const double ours = (s.initial_cost - it.trial_cost) / it.gain_ratio;
-  EXPECT_NEAR(ours, predicted, 1e-8 * predicted);
-  if (!it.accepted) return;
-  for (std::size_t i = 0; i < start.points.size(); ++i)
-    EXPECT_NEAR(problem.points[i], stepped.points[i], 1e-6 * (1 + std::abs(stepped.points[i])));
-  for (std::size_t i = 0; i < start.cameras.size(); ++i)
-    EXPECT_NEAR(problem.cameras[i].parameters[0], stepped.cameras[i].parameters[0],
-                1e-6 * std::abs(stepped.cameras[i].parameters[0]));
-}
-
 const std::vector<double> kDampings = {1e-4, 1e-2, 1, 100};
 
 TEST(Step, IsTheTextbooks) {

@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "solve/textbook.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/bal_camera.h"
+#include "geometry/camera_model.h"
 #include "linear/scaling.h"
+#include "sheaf/solve.h"
+#include "solve/scenes.h"
 
 namespace sheaf {
 namespace {
@@ -28,9 +32,11 @@ Places::Places(const Problem& p, const Fixed& fixed) {
   for (std::size_t i = 0; i < p.num_images(); ++i)
     for (int k = 0; k < 6; ++k)
       pose.push_back(!fixed.poses && free(fixed.pose_ids, i) ? count++ : -1);
-  const bool held[3] = {fixed.f, fixed.k1, fixed.k2};
+  const std::vector<ParameterSet> held = held_parameters(p, fixed);
   for (std::size_t i = 0; i < p.cameras.size(); ++i)
-    for (bool h : held) lens.push_back(!h && free(fixed.camera_ids, i) ? count++ : -1);
+    for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
+      lens.push_back(k < parameter_count(p.cameras[i].model) && (held[i] >> k & 1) == 0 ? count++
+                                                                                       : -1);
   for (std::size_t i = 0; i < p.points.size(); ++i) point.push_back(fixed.points ? -1 : count++);
 }
 
@@ -65,11 +71,11 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const
   for (std::size_t i = 0; i < p.num_observations(); ++i) {
     const std::size_t image = p.observation_image[i], point = p.observation_point[i];
     const std::size_t lens = p.image_camera[image];
-    const auto& k = p.cameras[lens].parameters;
-    const auto j = project_with_jacobian<double>(
-        matrix_from_quaternion(p.poses[image].rotation), p.poses[image].translation,
-        {k[0], k[1], k[2]},
-        {p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
+    const Matrix3<double> R = matrix_from_quaternion(p.poses[image].rotation);
+    const double* X = &p.points[3 * point];
+    Vector3<double> P = multiply(R, Vector3<double>{X[0], X[1], X[2]});
+    for (int k = 0; k < 3; ++k) P[k] += p.poses[image].translation[k];
+    const LensJacobian<double> j = project_with_jacobian(p.cameras[lens], P);
     const double r[2] = {j.pixel[0] - p.observation_xy[2 * i],
                          j.pixel[1] - p.observation_xy[2 * i + 1]};
     const LossValue<double> rho = evaluate_loss(loss, r[0] * r[0] + r[1] * r[1]);
@@ -77,11 +83,16 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const
     const double w = std::sqrt(rho.first);
     for (int row = 0; row < 2; ++row) {
       std::vector<std::pair<int, double>> entries;
-      for (int c = 0; c < 6; ++c)
-        entries.emplace_back(at.pose[6 * image + c], w * j.camera[9 * row + c]);
-      for (int c = 0; c < 3; ++c)
-        entries.emplace_back(at.lens[3 * lens + c], w * j.camera[9 * row + 6 + c]);
-      Vector3<double> by_point{j.point[3 * row], j.point[3 * row + 1], j.point[3 * row + 2]};
+      const Vector3<double> a = j.point[row], turn = cross(P, a);
+      Vector3<double> by_point{};
+      for (int c = 0; c < 3; ++c) {
+        entries.emplace_back(at.pose[6 * image + c], w * a[c]);
+        entries.emplace_back(at.pose[6 * image + 3 + c], w * turn[c]);
+        for (int k = 0; k < 3; ++k) by_point[c] += a[k] * R[3 * k + c];
+      }
+      for (std::size_t c = 0; c < kMaxCameraParameters; ++c)
+        if (const int place = at.lens[kMaxCameraParameters * lens + c]; place >= 0)
+          entries.emplace_back(place, w * j.parameters[row][c]);
       if (charts.rules.base != ChartBase::none) by_point = charts.at(p, point).transpose(by_point);
       for (int c = 0; c < 3; ++c) entries.emplace_back(at.point[3 * point + c], w * by_point[c]);
       add_row(entries, w * r[row]);
@@ -141,7 +152,7 @@ void move(Problem& p, const Places& at, const std::vector<double>& x, const Char
     p.poses[i] = {moved.rotation, moved.translation};
   }
   for (std::size_t i = 0; i < at.lens.size(); ++i)
-    p.cameras[i / 3].parameters[i % 3] += step(at.lens[i]);
+    p.cameras[i / kMaxCameraParameters].parameters[i % kMaxCameraParameters] += step(at.lens[i]);
   for (std::size_t i = 0; i < p.num_points() && at.point[3 * i] >= 0; ++i) {
     const Vector3<double> q{x[at.point[3 * i]], x[at.point[3 * i + 1]], x[at.point[3 * i + 2]]};
     if (charts.rules.base != ChartBase::none)
@@ -162,6 +173,57 @@ Problem first_points(const Problem& p, std::uint32_t points) {
       out.add_observation(p.observation_image[i], p.observation_point[i], p.observation_xy[2 * i],
                           p.observation_xy[2 * i + 1]);
   return out;
+}
+
+void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
+                          const Loss& loss, PointParametrisation points,
+                          CameraSolverKind solver) {
+  const Places at(start, fixed);
+  const Charts charts(start, points);
+  const ScaledLoss scaled{loss.kind, loss.scale_px};
+  const Normal normal(start, at, scaled, charts);
+  const std::size_t n = normal.b.size();
+  std::vector<double> A = normal.A, D(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    D[i] = damping * std::clamp(A[i * n + i], 1e-6, 1e32);
+    A[i * n + i] += D[i];
+  }
+  const std::vector<double> x = solve_dense(A, normal.b);
+  double linear = 0, quadratic = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    linear += normal.b[i] * x[i];
+    for (std::size_t j = 0; j < n; ++j) quadratic += x[i] * normal.A[i * n + j] * x[j];
+  }
+  const double predicted = linear - quadratic / 2;  // by definition: cost - 1/2 |r + J x|^2
+  Problem stepped = start;
+  move(stepped, at, x, charts);
+  const double trial = robust_cost(stepped, scaled);
+
+  Problem problem = start;
+  SolveOptions options;
+  options.fixed = fixed;
+  options.initial_damping = damping;
+  options.loss = loss;
+  options.points = points;
+  options.inner_iterations = 0;  // the textbook has none
+  options.max_iterations = 1;
+  options.gradient_tolerance = 0;
+  options.solver = solver;
+  const Summary s = solve(problem, options);
+  ASSERT_EQ(s.iterations.size(), 2u);
+  const Iteration& it = s.iterations[1];
+  EXPECT_NEAR(s.initial_cost, normal.cost, 1e-12 * normal.cost);
+  EXPECT_NEAR(it.trial_cost, trial, 1e-7 * trial);
+  const double ours = (s.initial_cost - it.trial_cost) / it.gain_ratio;
+  EXPECT_NEAR(ours, predicted, 1e-8 * predicted);
+  if (!it.accepted) return;
+  for (std::size_t i = 0; i < start.points.size(); ++i)
+    EXPECT_NEAR(problem.points[i], stepped.points[i], 1e-6 * (1 + std::abs(stepped.points[i])));
+  for (std::size_t i = 0; i < start.cameras.size(); ++i)
+    for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
+      EXPECT_NEAR(problem.cameras[i].parameters[k], stepped.cameras[i].parameters[k],
+                  1e-6 * (1e-3 + std::abs(stepped.cameras[i].parameters[k])))
+          << "camera " << i << ", " << k;
 }
 
 }  // namespace sheaf

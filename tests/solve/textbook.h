@@ -18,7 +18,7 @@ namespace sheaf {
 
 /// Where the parameters of a problem stand in the textbook's vector; -1: held.
 struct Places {
-  std::vector<int> pose, lens, point;
+  std::vector<int> pose, lens, point;  ///< 6 per image, kMaxCameraParameters per lens, 3 per point
   int count = 0;
 
   Places(const Problem& p, const Fixed& fixed);
@@ -50,6 +50,13 @@ std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b);
 
 /// Steps every free parameter by x.
 void move(Problem& p, const Places& at, const std::vector<double>& x, const Charts& charts);
+
+/// One step of `solve` with this damping against the textbook's: cost, trial cost, predicted decrease
+/// and, where it is accepted, the state.
+void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
+                          const Loss& loss = {},
+                          PointParametrisation points = PointParametrisation::xyz,
+                          CameraSolverKind solver = CameraSolverKind::automatic);
 
 inline Fixed points_held() {
   Fixed fixed;

@@ -1,0 +1,264 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "refinement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <map>
+#include <numeric>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "refinement_items.h"
+#include "sheaf/error.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+using Part = RefinementItem::Part;
+
+/// How few an item names: all, a pattern, one; and within these a lens, a kind of its parameters, a
+/// single one.
+int narrowness(const RefinementItem& item, bool pattern) {
+  const int reach = item.who.empty() ? 0 : pattern ? 10 : 20;
+  const bool whole = item.part == Part::lens || item.part == Part::image;
+  return reach + (whole ? 0 : item.part == Part::parameter ? 2 : 1);
+}
+
+/// An item and what it is about in this problem.
+struct Resolved {
+  const RefinementItem* item;
+  int narrowness = 0;
+  bool points = false;
+  std::vector<std::uint32_t> images;                            ///< poses
+  std::vector<std::pair<std::uint32_t, std::uint16_t>> lenses;  ///< parameters of lenses
+};
+
+using BitsOfModels = std::array<std::uint16_t, kCameraModels>;
+
+BitsOfModels bits_of_models(const RefinementItem& item) {
+  BitsOfModels out;
+  for (std::size_t m = 0; m < kCameraModels; ++m)
+    out[m] = parameters_of(item, static_cast<CameraModel>(m));
+  return out;
+}
+
+std::size_t model_number(const Problem& problem, std::size_t lens) {
+  return static_cast<std::size_t>(problem.cameras[lens].model);
+}
+
+std::vector<std::uint32_t> all(std::size_t count) {
+  std::vector<std::uint32_t> out(count);
+  std::iota(out.begin(), out.end(), 0u);
+  return out;
+}
+
+std::vector<std::uint32_t> lenses_of(const std::vector<std::uint32_t>& images,
+                                     const Problem& problem) {
+  std::set<std::uint32_t> lenses;
+  for (const std::uint32_t j : images) lenses.insert(problem.image_camera[j]);
+  return {lenses.begin(), lenses.end()};
+}
+
+void refuse_absent_parameter(const RefinementItem& item, const Problem& problem,
+                             const std::vector<std::uint32_t>& lenses) {
+  std::set<std::string> known;
+  for (const std::uint32_t c : lenses) {
+    const CameraModel model = problem.cameras[c].model;
+    const std::vector<std::string_view> names = parameter_names(model);
+    known.insert(fmt::format("{} has {}", to_string(model), fmt::join(names, ", ")));
+  }
+  throw Error(ErrorCode::usage,
+              fmt::format("{} {}: no camera that is meant has this parameter; {}",
+                          item.refine ? "--refine" : "--fix", item.text, fmt::join(known, "; ")));
+}
+
+Resolved resolve(const RefinementItem& item, const Problem& problem) {
+  Resolved out;
+  out.item = &item;
+  Named named;
+  const bool by_image = item.part == Part::poses || item.part == Part::image;
+  if (item.who.empty()) {
+    named.indices = all(by_image ? problem.num_images() : problem.cameras.size());
+  } else {
+    named = by_image ? images_named(item, problem) : lenses_named(item, problem);
+  }
+  out.narrowness = narrowness(item, named.pattern);
+  out.points = item.part == Part::points;
+  if (by_image) out.images = named.indices;
+  if (out.points || item.part == Part::poses) return out;
+  const auto lenses = by_image ? lenses_of(named.indices, problem) : named.indices;
+  const BitsOfModels bits = bits_of_models(item);
+  unsigned any = 0;
+  for (const std::uint32_t c : lenses) {
+    out.lenses.emplace_back(c, bits[model_number(problem, c)]);
+    any |= out.lenses.back().second;
+  }
+  if (any == 0 && item.part == Part::parameter) refuse_absent_parameter(item, problem, lenses);
+  return out;
+}
+
+/// Who has decided over the points, a pose or a parameter so far.
+class Decisions {
+ public:
+  Decisions(const Problem& problem, const std::vector<Resolved>& resolved)
+      : resolved_(resolved), images_(problem.num_images()) {
+    last_.assign(1 + images_ + kMaxCameraParameters * problem.cameras.size(), 0);
+  }
+  static constexpr std::size_t kPoints = 0;
+  static std::size_t pose(std::uint32_t image) { return 1 + image; }
+  std::size_t parameter(std::uint32_t lens, int k) const {
+    return 1 + images_ + kMaxCameraParameters * lens + static_cast<std::size_t>(k);
+  }
+
+  /// Later calls are narrower, or as narrow.
+  void decide(std::size_t what, std::uint32_t by) {
+    const std::uint32_t before = std::exchange(last_[what], by + 1);
+    if (before == 0) return;
+    const Resolved &a = resolved_[before - 1], &b = resolved_[by];
+    if (a.narrowness != b.narrowness || a.item->refine == b.item->refine) return;
+    throw Error(ErrorCode::usage, fmt::format("--fix {} and --refine {} contradict each other",
+                                              (b.item->refine ? a : b).item->text,
+                                              (b.item->refine ? b : a).item->text));
+  }
+
+ private:
+  const std::vector<Resolved>& resolved_;
+  std::size_t images_;
+  std::vector<std::uint32_t> last_;  ///< 1 + index into resolved_; 0: nobody
+};
+
+Refinement by_default(const Problem& problem) {
+  RefinementItem centre, lens;
+  centre.part = Part::principal_point;
+  lens.part = Part::lens;
+  const BitsOfModels centres = bits_of_models(centre), lenses = bits_of_models(lens);
+  Refinement out;
+  out.poses.assign(problem.num_images(), true);
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    const std::size_t m = model_number(problem, c);
+    out.lenses.push_back(static_cast<std::uint16_t>(lenses[m] & ~centres[m]));
+  }
+  return out;
+}
+
+void apply(const Resolved& resolved, std::uint32_t number, Decisions& decisions, Refinement& out) {
+  const bool refine = resolved.item->refine;
+  if (resolved.points) {
+    decisions.decide(Decisions::kPoints, number);
+    out.points = refine;
+  }
+  for (const std::uint32_t j : resolved.images) {
+    decisions.decide(Decisions::pose(j), number);
+    out.poses[j] = refine;
+  }
+  for (const auto& [c, bits] : resolved.lenses) {
+    for (unsigned left = bits; left != 0; left &= left - 1)
+      decisions.decide(decisions.parameter(c, std::countr_zero(left)), number);
+    const unsigned were = out.lenses[c];
+    out.lenses[c] = static_cast<std::uint16_t>(refine ? were | bits : were & ~unsigned{bits});
+  }
+}
+
+std::vector<RefinementItem> parse_all(const RefinementArguments& a) {
+  std::vector<RefinementItem> items;
+  for (const bool refine : {false, true})
+    for (const std::string& list : refine ? a.refine : a.fix)
+      if (const std::string wrong = parse_items(list, refine, items); !wrong.empty())
+        throw Error(ErrorCode::usage, (refine ? "--refine: " : "--fix: ") + wrong);
+  return items;
+}
+
+CLI::Validator list_of_items(bool refine) {
+  return CLI::Validator(
+      [refine](std::string& text) {
+        std::vector<RefinementItem> ignored;
+        return parse_items(text, refine, ignored);
+      },
+      "");
+}
+
+}  // namespace
+
+void add_refinement_options(CLI::App& verb, RefinementArguments& a, const std::string& of_fix) {
+  verb.add_option("--fix", a.fix,
+                  of_fix +
+                      ": a comma-separated list of points, poses, intrinsics, f, k (distortion), "
+                      "pp (principal point) or a parameter's name (fx, k1, ...); of named ones as "
+                      "pose=WHO, camera=WHO, image=WHO (both), f=WHO, ...; WHO is a camera's or "
+                      "image's id, an image's name, or a pattern as 'left/*'")
+      ->type_name("LIST")
+      ->allow_extra_args(false)
+      ->check(list_of_items(false));
+  verb.add_option(
+          "--refine", a.refine,
+          "likewise what moves besides, or of what --fix holds; by default all but pp. What "
+          "names fewer wins: --fix poses --refine pose=new.jpg")
+      ->type_name("LIST")
+      ->allow_extra_args(false)
+      ->check(list_of_items(true));
+}
+
+std::vector<std::string> items_of(const std::vector<std::string>& lists) {
+  std::vector<std::string> out;
+  for (const std::string& list : lists)
+    for (std::string& item : split_items(list)) out.push_back(std::move(item));
+  return out;
+}
+
+Refinement refinement_of(const RefinementArguments& arguments, const Problem& problem) {
+  Refinement out = by_default(problem);
+  if (!arguments.given()) return out;
+  const std::vector<RefinementItem> items = parse_all(arguments);
+  std::vector<Resolved> resolved;
+  for (const RefinementItem& item : items) resolved.push_back(resolve(item, problem));
+  std::stable_sort(resolved.begin(), resolved.end(), [](const Resolved& a, const Resolved& b) {
+    return a.narrowness < b.narrowness;
+  });
+  Decisions decisions(problem, resolved);
+  for (std::uint32_t i = 0; i < resolved.size(); ++i) apply(resolved[i], i, decisions, out);
+  return out;
+}
+
+Fixed fixed_of(const Refinement& refinement, const Problem& problem) {
+  const auto moves = [](char moving) { return moving != 0; };
+  Fixed out;
+  out.points = !refinement.points;
+  out.poses = std::none_of(refinement.poses.begin(), refinement.poses.end(), moves);
+  if (!out.poses)
+    for (std::uint32_t j = 0; j < problem.num_images(); ++j)
+      if (!moves(refinement.poses[j])) out.pose_ids.push_back(j);
+  for (const std::uint16_t free : refinement.lenses)
+    out.parameters.push_back(static_cast<ParameterSet>(~unsigned{free}));
+  return out;
+}
+
+std::string held_text(const Refinement& refinement, const Problem& problem) {
+  std::vector<std::string> parts;
+  if (!refinement.points) parts.emplace_back("points");
+  const auto held = std::count(refinement.poses.begin(), refinement.poses.end(), char{0});
+  if (held > 0)
+    parts.push_back(fmt::format("poses of {} of {} images", held, problem.num_images()));
+  std::map<std::string, std::size_t> lenses;
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    std::vector<std::string_view> names = parameter_names(problem.cameras[c].model);
+    const std::size_t count = names.size();
+    std::size_t k = 0;
+    std::erase_if(names, [&](std::string_view) { return (refinement.lenses[c] >> k++ & 1) != 0; });
+    if (names.size() == count) {
+      ++lenses["all"];
+    } else if (!names.empty()) {
+      ++lenses[fmt::format("{}", fmt::join(names, ", "))];
+    }
+  }
+  for (const auto& [names, count] : lenses)
+    parts.push_back(fmt::format("{} of {} of {} lenses", names, count, problem.cameras.size()));
+  return fmt::format("{}", fmt::join(parts, "; "));
+}
+
+}  // namespace sheaf

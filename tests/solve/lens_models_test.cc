@@ -1,0 +1,340 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Lenses of any model, own or shared, alone or mixed: steps against the textbook's, which shares
+// nothing with the kernels but the scalar statement of each model.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "io/models.h"
+#include "sheaf/sheaf.h"
+#include "solve/scenes.h"
+#include "solve/textbook.h"
+
+namespace sheaf {
+namespace {
+
+using test::seen_by;
+
+Camera ordinary(CameraModel model) {
+  switch (model) {
+    case CameraModel::bal:
+      return {model, {500, -0.05, 0.01}};
+    case CameraModel::simple_pinhole:
+      return {model, {500, 320, 240}};
+    case CameraModel::pinhole:
+      return {model, {500, 510, 320, 240}};
+    case CameraModel::simple_radial:
+      return {model, {500, 320, 240, -0.05}};
+    case CameraModel::radial:
+      return {model, {500, 320, 240, -0.05, 0.01}};
+    case CameraModel::opencv:
+      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003}};
+    case CameraModel::full_opencv:
+      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003, 0.004, 0.03, -0.02, 0.01}};
+    case CameraModel::opencv_fisheye:
+      return {model, {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.0004}};
+    case CameraModel::simple_radial_fisheye:
+      return {model, {300, 320, 240, -0.02}};
+    case CameraModel::radial_fisheye:
+      return {model, {300, 320, 240, 0.02, -0.006}};
+    case CameraModel::thin_prism_fisheye:
+      return {model,
+              {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.003, 0.002, -0.0004, 0.001, -0.002}};
+    case CameraModel::fov:
+      return {model, {300, 310, 320, 240, 0.9}};
+    case CameraModel::eucm:
+      return {model, {300, 310, 320, 240, 0.65, 1.1}};
+  }
+  return {};
+}
+
+/// Noise on the measurements, a disturbed start.
+Problem disturbed(const std::vector<Camera>& lenses, std::size_t images, std::size_t points,
+                  unsigned seed) {
+  Problem problem = seen_by(lenses, images, points, seed);
+  std::mt19937 random(seed + 100);
+  std::normal_distribution<double> normal;
+  for (double& x : problem.observation_xy) x += 0.3 * normal(random);
+  for (double& x : problem.points) x += 0.01 * normal(random);
+  for (Camera& camera : problem.cameras)
+    for (std::size_t k = 0; k < parameter_count(camera.model); ++k)
+      camera.parameters[k] *= 1 + 1e-3 * normal(random);
+  return problem;
+}
+
+/// A copy of the problem in which every image has a lens of its own.
+Problem unshared(Problem problem) {
+  const std::vector<Camera> lenses = problem.cameras;
+  problem.cameras.clear();
+  for (std::size_t i = 0; i < problem.num_images(); ++i) {
+    problem.cameras.push_back(lenses[problem.image_camera[i]]);
+    problem.image_camera[i] = static_cast<std::uint32_t>(i);
+  }
+  return problem;
+}
+
+/// Leaves out observations, so that tracks have different lengths and images.
+Problem thinned(const Problem& problem, unsigned seed) {
+  Problem out = problem;
+  out.observation_image.clear(), out.observation_point.clear(), out.observation_xy.clear();
+  std::mt19937 random(seed);
+  for (std::size_t i = 0; i < problem.num_observations(); ++i)
+    if (random() % 4 != 0)
+      out.add_observation(problem.observation_image[i], problem.observation_point[i],
+                          problem.observation_xy[2 * i], problem.observation_xy[2 * i + 1]);
+  return out;
+}
+
+std::vector<CameraModel> all_models() {
+  std::vector<CameraModel> out;
+  for (std::size_t m = 0; m < kCameraModels; ++m) out.push_back(static_cast<CameraModel>(m));
+  return out;
+}
+
+Fixed nothing_held(const Problem& problem) {
+  Fixed fixed;
+  fixed.parameters.assign(problem.cameras.size(), 0);
+  return fixed;
+}
+
+TEST(LensModels, StepsAreTheTextbooksWithSharedLenses) {
+  for (CameraModel model : all_models()) {
+    SCOPED_TRACE(to_string(model));
+    const Problem problem = thinned(disturbed({ordinary(model)}, 5, 23, 1), 2);
+    expect_textbook_step(problem, {}, 1e-3);
+    expect_textbook_step(problem, nothing_held(problem), 1e-2);
+  }
+}
+
+TEST(LensModels, StepsAreTheTextbooksWithLensesOfTheirOwn) {
+  for (CameraModel model : all_models()) {
+    SCOPED_TRACE(to_string(model));
+    const Problem problem = unshared(thinned(disturbed({ordinary(model)}, 5, 23, 3), 4));
+    expect_textbook_step(problem, {}, 1e-3);
+    expect_textbook_step(problem, nothing_held(problem), 1e-2);
+  }
+}
+
+/// All models, one image each; then each model shared by two images; then some of each.
+std::vector<Problem> mixtures() {
+  std::vector<Camera> lenses;
+  for (CameraModel model : all_models()) lenses.push_back(ordinary(model));
+  const Problem one = thinned(disturbed(lenses, lenses.size(), 21, 5), 6);
+  const Problem two = thinned(disturbed(lenses, 2 * lenses.size(), 11, 7), 8);
+  const Problem some = thinned(disturbed({ordinary(CameraModel::opencv),
+                                          ordinary(CameraModel::full_opencv),
+                                          ordinary(CameraModel::opencv),
+                                          ordinary(CameraModel::thin_prism_fisheye)},
+                                         6, 21, 9),
+                               10);
+  return {one, two, some};
+}
+
+TEST(LensModels, StepsAreTheTextbooksWhereModelsAreMixed) {
+  for (const Problem& problem : mixtures()) {
+    expect_textbook_step(problem, {}, 1e-3);
+    expect_textbook_step(problem, nothing_held(problem), 1e-2);
+  }
+}
+
+TEST(LensModels, StepsAreTheTextbooksBySparseCholesky) {
+  for (const Problem& problem : mixtures())
+    expect_textbook_step(problem, {}, 1e-3, {}, PointParametrisation::xyz,
+                         CameraSolverKind::sparse);
+}
+
+TEST(LensModels, StepsAreTheTextbooksWithPartsHeld) {
+  for (const Problem& problem : mixtures()) {
+    Fixed some = nothing_held(problem);
+    for (std::size_t c = 0; c < some.parameters.size(); ++c)
+      some.parameters[c] = static_cast<ParameterSet>(0x2d5 >> c % 3);
+    some.camera_ids = {1};
+    some.pose_ids = {0, 3};
+    Fixed poses;
+    poses.poses = true;
+    Fixed intrinsics;
+    intrinsics.intrinsics = true;
+    for (const Fixed& fixed : {some, poses, intrinsics, points_held()})
+      expect_textbook_step(problem, fixed, 1e-2);
+  }
+}
+
+TEST(LensModels, StepsAreTheTextbooksWithALoss) {
+  for (const Problem& problem : mixtures()) {
+    expect_textbook_step(problem, {}, 1e-2, Cauchy{0.5});
+    expect_textbook_step(problem, points_held(), 1e-2, Huber{0.5});
+  }
+}
+
+TEST(LensModels, StepsAreTheTextbooksWhereOneImageSeesAPointTwice) {
+  Problem problem = mixtures()[2];
+  for (std::size_t i = 0; i < 60; i += 3)
+    problem.add_observation(problem.observation_image[i], problem.observation_point[i],
+                            problem.observation_xy[2 * i] + 3, problem.observation_xy[2 * i + 1]);
+  expect_textbook_step(problem, {}, 1e-2);
+}
+
+/// What a start and options end with.
+struct Solved {
+  Problem problem;
+  Summary summary;
+
+  Solved(const Problem& start, const SolveOptions& options) : problem(start) {
+    summary = solve(problem, options);
+  }
+};
+
+TEST(LensModels, EveryInstructionSetAndThreadCountEndsAlike) {
+  for (const Problem& start : mixtures()) {
+    SolveOptions options;
+    options.threads = 1;
+    options.loss = Huber{1};
+    const Solved best(start, options);
+    EXPECT_LT(best.summary.final_cost, 0.5 * best.summary.initial_cost);
+    options.threads = 3;
+    const Solved threads(start, options);
+    EXPECT_EQ(state_hash(best.problem), state_hash(threads.problem));
+    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2}) {
+      options.simd = simd;
+      Problem problem = start;
+      const Result<Summary> other = try_solve(problem, options);
+      if (!other.ok()) continue;  // the machine does not have it
+      EXPECT_NEAR(other.value().final_cost, best.summary.final_cost,
+                  1e-9 * best.summary.final_cost);
+    }
+  }
+}
+
+/// Enough of everything that all parameters are well determined.
+Problem determined(bool shared) {
+  const Problem problem = thinned(disturbed({ordinary(CameraModel::opencv),
+                                             ordinary(CameraModel::radial_fisheye)},
+                                            10, 300, 13),
+                                  14);
+  return shared ? problem : unshared(problem);
+}
+
+TEST(LensModels, SolversEndAlike) {
+  for (bool shared : {true, false}) {
+    const Problem start = determined(shared);
+    SolveOptions options;
+    options.tolerance = 1e-13;
+    options.max_iterations = 200;
+    options.solver = CameraSolverKind::dense;
+    const Solved dense(start, options);
+    EXPECT_EQ(dense.summary.solver, "dense");
+    EXPECT_NEAR(dense.summary.final_cost, evaluate(dense.problem).cost,
+                1e-10 * dense.summary.final_cost);
+    EXPECT_LT(scaled_gradient(dense.problem), 1e-3);
+    for (CameraSolverKind kind : {CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+                                  CameraSolverKind::iterative_implicit}) {
+      options.solver = kind;
+      const Solved other(start, options);
+      EXPECT_NEAR(other.summary.final_cost, dense.summary.final_cost,
+                  1e-8 * dense.summary.final_cost)
+          << other.summary.solver;
+    }
+  }
+}
+
+TEST(LensModels, WhatIsHeldStaysBitForBit) {
+  for (const Problem& start : mixtures()) {
+    SolveOptions options;
+    options.fixed.pose_ids = {1};
+    options.fixed.camera_ids = {0};
+    const Solved run(start, options);
+    EXPECT_EQ(run.problem.poses[1].rotation, start.poses[1].rotation);
+    EXPECT_EQ(run.problem.poses[1].translation, start.poses[1].translation);
+    EXPECT_EQ(run.problem.cameras[0].parameters, start.cameras[0].parameters);
+    for (std::size_t c = 0; c < start.cameras.size(); ++c) {
+      const ParameterSet principal = principal_point(start.cameras[c].model);
+      for (std::size_t k = 0; k < kMaxCameraParameters; ++k) {
+        const double before = start.cameras[c].parameters[k],
+                     after = run.problem.cameras[c].parameters[k];
+        const bool free = k < parameter_count(start.cameras[c].model) && c != 0 &&
+                          (principal >> k & 1) == 0;
+        EXPECT_EQ(before == after, !free) << "camera " << c << ", " << k;
+      }
+    }
+  }
+}
+
+/// Cameras amid their points, which are seen in all directions that the lens sees.
+Problem surrounded(CameraModel model, double most_degrees, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Problem problem;
+  problem.cameras = {ordinary(model)};
+  for (int i = 0; i < 300; ++i) {
+    double X[3], length = 0;
+    for (double& x : X) x = normal(random), length += x * x;
+    for (double& x : X) x *= (4 + 0.5 * normal(random)) / std::sqrt(length);
+    problem.add_point(X[0], X[1], X[2]);
+  }
+  for (int j = 0; j < 12; ++j) {
+    Pose pose;
+    pose.rotation = quaternion_from_angle_axis<double>(
+        {0.6 * normal(random), 0.6 * normal(random), 0.6 * normal(random)});
+    pose.translation = {0.5 * normal(random), 0.5 * normal(random), 0.5 * normal(random)};
+    const std::uint32_t image = problem.add_image(pose, 0u);
+    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+    for (std::uint32_t i = 0; i < problem.num_points(); ++i) {
+      const double* X = &problem.points[3 * i];
+      Vector3<double> P = multiply(R, Vector3<double>{X[0], X[1], X[2]});
+      for (std::size_t k = 0; k < 3; ++k) P[k] += pose.translation[k];
+      const double degrees = std::atan2(std::hypot(P[0], P[1]), P[2]) * 180 / 3.14159265358979;
+      if (degrees > most_degrees || !sees(problem.cameras[0], P)) continue;
+      const auto pixel = project(problem.cameras[0], P).pixel;
+      problem.add_observation(image, i, pixel[0], pixel[1]);
+    }
+  }
+  return problem;
+}
+
+TEST(LensModels, WideLensesConvergeFromADegreeAndAHundredth) {
+  for (CameraModel model : {CameraModel::opencv_fisheye, CameraModel::simple_radial_fisheye,
+                            CameraModel::radial_fisheye, CameraModel::eucm, CameraModel::fov}) {
+    SCOPED_TRACE(to_string(model));
+    const Problem truth = surrounded(model, 100, 11);
+    Problem start = truth;
+    std::mt19937 random(12);
+    std::normal_distribution<double> normal;
+    for (Pose& pose : start.poses) {
+      const double degree = 3.14159265358979 / 180;
+      const auto moved = left_perturbed(
+          RigidMotion<double>{pose.rotation, pose.translation}, {0, 0, 0},
+          {degree * normal(random), degree * normal(random), degree * normal(random)});
+      pose = {moved.rotation, moved.translation};
+      for (double& t : pose.translation) t *= 1 + 0.01 * normal(random);
+    }
+    for (double& x : start.points) x *= 1 + 0.01 * normal(random);
+    for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
+      if ((principal_point(model) >> k & 1) == 0)
+        start.cameras[0].parameters[k] *= 1 + 0.01 * normal(random);
+    const Solved run(start, {.max_iterations = 100, .tolerance = 1e-12});
+    EXPECT_LT(run.summary.final_rms_px, 1e-6);
+    for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
+      EXPECT_NEAR(run.problem.cameras[0].parameters[k], truth.cameras[0].parameters[k],
+                  1e-5 * (1 + std::abs(truth.cameras[0].parameters[k])));
+  }
+}
+
+TEST(LensModels, WhatIsNotThereYetIsRefusedInWords) {
+  Problem problem = mixtures()[2];
+  SolveOptions options;
+  options.trust_region = TrustRegion::dogleg;
+  EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
+  options = {};
+  options.points = PointParametrisation::inverse_depth;
+  EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
+  options = {};
+  options.fixed.parameters = {0};
+  EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
+}
+
+}  // namespace
+}  // namespace sheaf
