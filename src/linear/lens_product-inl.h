@@ -24,7 +24,7 @@ struct LensBlocks {
 
   HWY_INLINE LensBlocks(const LensTracks& tracks, std::uint64_t batch, int j) {
     uniform = tracks.uniform_lens[batch] >= 0;
-    for (int l = 0; l < 8; ++l) {
+    for (int l = 0; l < (uniform ? 1 : 8); ++l) {
       const LensPlaces& lens = tracks.lenses[tracks.lens[8 * batch + static_cast<std::size_t>(l)]];
       of_lane[l] = j < lens.blocks ? static_cast<std::int32_t>(lens.first_block) + j : -1;
     }
@@ -33,13 +33,19 @@ struct LensBlocks {
 
 /// Nine of a block's numbers, kProductRecord apart, for the lanes of a part; 0 where there is none.
 HWY_INLINE void load_block(const double* x, const LensBlocks& blocks, int lane, V* out) {
+  if (blocks.uniform) {
+    const std::int32_t block = blocks.of_lane[0];
+    for (int i = 0; i < 9; ++i)
+      out[i] = block < 0 ? zero() : set(x[kProductRecord * static_cast<std::size_t>(block) + i]);
+    return;
+  }
   for (int i = 0; i < 9; ++i) {
     alignas(64) double lanes[8];
     for (int l = 0; l < kLanes; ++l) {
       const std::int32_t block = blocks.of_lane[lane + l];
       lanes[l] = block < 0 ? 0 : x[kProductRecord * static_cast<std::size_t>(block) + i];
     }
-    out[i] = blocks.uniform ? set(lanes[0]) : load(lanes);
+    out[i] = load(lanes);
   }
 }
 
