@@ -92,10 +92,9 @@ int run(const Arguments& arguments) {
   if (!outputs.pictures().empty())
     fmt::print("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
   if (!arguments.common.json.empty()) {
-    const PhotometricRecord record{
-        arguments.in,  folder.format, arguments.photometric, outputs.pictures(),
-        folder.read_s, write_s,       total.seconds(),       before,
-        after};
+    const PhotometricRecord record{arguments.in,       folder.format, arguments.photometric,
+                                   outputs.pictures(), folder.read_s, write_s,
+                                   total.seconds(),    before,        after};
     write_json(photometric_json(record, summary, details, problem), arguments.common.json);
   }
   return exit_code_of(summary.solve.termination);

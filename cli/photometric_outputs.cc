@@ -4,22 +4,12 @@
 
 #include <filesystem>
 
+#include "io/folder_files.h"
 #include "outputs.h"
 #include "report/photometric_pictures.h"
 #include "sheaf/solve.h"
 
 namespace sheaf {
-namespace {
-
-void make_folder(const std::string& path) {
-  std::error_code error;
-  std::filesystem::create_directories(path, error);
-  if (error)
-    throw Error(ErrorCode::unwritable_output,
-                path + ": the folder cannot be made: " + error.message());
-}
-
-}  // namespace
 
 void add_photometric_output_options(CLI::App& verb, PhotometricOutputArguments& a) {
   verb.add_option("-o,--output", a.out,
@@ -42,7 +32,7 @@ PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& argumen
     : arguments_(arguments) {
   std::string probe;
   if (!arguments_.pictures.empty()) {
-    make_folder(arguments_.pictures);
+    make_folder(arguments_.pictures).value();
     probe = std::filesystem::path(arguments_.pictures) / "worst-patches.png";
   }
   check_outputs({{"--ply", arguments_.ply}, {"--pictures", probe}, {"--json", json}});

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <memory>
 
-#include "image/png.h"
-#include "io/direct_folder.h"
+#include "image/jpeg.h"
+#include "io/folder_files.h"
 #include "sheaf/io.h"
 
 namespace sheaf {
@@ -47,7 +47,7 @@ Result<Raster> raster_of(const PhotometricFolder& folder, std::size_t image) {
   if (image < folder.files.size()) {
     const Result<std::string> bytes = bytes_of(folder.files[image]);
     if (!bytes.ok()) return bytes.error();
-    return decode_png(bytes.value(), folder.files[image].string());
+    return decode_image(bytes.value(), folder.files[image].string());
   }
   const GreyImage& grey = folder.problem.images[image];
   Raster raster{grey.width, grey.height, 1, 8, {}};

@@ -1,28 +1,12 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/output_file.h"
-#include "io/text_buffer.h"
+#include "io/folder_files.h"
 #include "sheaf/io.h"
 
 namespace sheaf {
-namespace {
-
-namespace fs = std::filesystem;
-
-template <class Put>
-Result<void> write_lines(const fs::path& path, const Put& put) {
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
-  if (!out.ok()) return out.error();
-  TextBuffer text(out.value());
-  put(text);
-  text.flush();
-  return out.value().commit();
-}
-
-}  // namespace
 
 Result<void> write_photometric_details(const PhotometricDetails& details, std::size_t points,
-                                       const fs::path& path) {
+                                       const std::filesystem::path& path) {
   const auto put_images = [&](TextBuffer& text) {
     auto sight = details.seen.begin();
     for (std::size_t i = 0; i < points; ++i) {
@@ -34,9 +18,9 @@ Result<void> write_photometric_details(const PhotometricDetails& details, std::s
       }
     }
   };
-  if (auto r = write_lines(path / "visibility.txt", put_images); !r.ok()) return r;
+  if (auto r = write_text_file(path / "visibility.txt", put_images); !r.ok()) return r;
   const std::size_t each = details.of_inverse_depth ? 1 : 3;
-  return write_lines(path / "sigma.txt", [&](TextBuffer& text) {
+  return write_text_file(path / "sigma.txt", [&](TextBuffer& text) {
     for (std::size_t k = 0; k < details.sigma.size(); ++k)
       text.put(details.sigma[k], (k + 1) % each == 0 ? '\n' : ' ');
   });

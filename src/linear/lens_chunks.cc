@@ -29,8 +29,7 @@ std::vector<std::uint32_t> lenses_of_blocks(const LensTracks& tracks) {
   std::vector<std::uint32_t> out(tracks.num_blocks, 0);
   for (std::uint32_t c = 0; c < tracks.lenses.size(); ++c) {
     const LensPlaces& lens = tracks.lenses[c];
-    for (std::uint32_t b = lens.first_block; b < lens.first_block + lens.blocks; ++b)
-      out[b] = c;
+    for (std::uint32_t b = lens.first_block; b < lens.first_block + lens.blocks; ++b) out[b] = c;
   }
   return out;
 }
@@ -165,9 +164,8 @@ bool LensChunks::possible(const Batches& batches, const LensTracks& tracks) {
 LensChunks cut_lens_chunks(const Batches& batches, const LensTracks& tracks, bool pairs,
                            Threads& threads) {
   LensChunks out;
-  out.chunks =
-      cut_into_chunks(batches, static_cast<std::uint32_t>(tracks.image_lens.size()),
-                      pairs ? ChunkLists::pairs : ChunkLists::diagonal, threads);
+  out.chunks = cut_into_chunks(batches, static_cast<std::uint32_t>(tracks.image_lens.size()),
+                               pairs ? ChunkLists::pairs : ChunkLists::diagonal, threads);
   add_own_tiles(tracks, out);
   if (pairs && tracks.most_blocks > 0) {
     list_slot_pairs(batches, tracks, out, threads);

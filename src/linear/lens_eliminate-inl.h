@@ -29,8 +29,7 @@ class SlotSums {
  public:
   HWY_INLINE SlotSums(double* sums, std::uint32_t rows) : sums_(sums) {
     // One row beyond: where a lens of one block stands last, what would be its second.
-    for (std::size_t i = 0; i < 27 * (std::size_t(rows) + 1); ++i)
-      store(zero(), sums + i * kLanes);
+    for (std::size_t i = 0; i < 27 * (std::size_t(rows) + 1); ++i) store(zero(), sums + i * kLanes);
   }
   HWY_INLINE double* row(std::size_t row) { return sums_ + 27 * kLanes * row; }
 
@@ -75,8 +74,7 @@ struct Whitened {
     for (int r = 0; r < 2; ++r) forward(f, j.point[r], b[r]);
     const V one = set(1.0), tiny = set(1e-20);
     V m00 = fnma(b[0][0], b[0][0], fnma(b[0][1], b[0][1], fnma(b[0][2], b[0][2], one)));
-    const V m01 =
-        hn::Neg(fma(b[0][0], b[1][0], fma(b[0][1], b[1][1], hn::Mul(b[0][2], b[1][2]))));
+    const V m01 = hn::Neg(fma(b[0][0], b[1][0], fma(b[0][1], b[1][1], hn::Mul(b[0][2], b[1][2]))));
     V m11 = fnma(b[1][0], b[1][0], fnma(b[1][1], b[1][1], fnma(b[1][2], b[1][2], one)));
     m00 = hn::Max(m00, tiny);
     i0 = inverse_sqrt(m00);

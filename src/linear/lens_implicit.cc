@@ -84,9 +84,7 @@ class LensImplicitSolver : public CameraSolver {
     operator_.begin(held_());
     return cg_.run(operator_, Preconditioner{blocks_, system.coarse}, system, x);
   }
-  std::uint64_t bytes() const override {
-    return operator_.bytes() + blocks_.bytes() + cg_.bytes();
-  }
+  std::uint64_t bytes() const override { return operator_.bytes() + blocks_.bytes() + cg_.bytes(); }
 
  private:
   std::function<LensProductInput()> held_;

@@ -36,6 +36,11 @@ void multiply_lenses(const LensTracks& tracks, const LensTiles& tiles_of, const 
   lens_products(tracks, tiles_of, chunks, chunk, records, diagonal, tiles);
 }
 
+void multiply_poses(const Chunks& chunks, const Chunk& chunk, const Records& records,
+                    double* tiles) {
+  pose_pair_products(chunks, chunk, records, tiles);
+}
+
 void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) {
   if (in.loss.kind == LossKind::none)
     lens_trial_chunk<false>(in, chunk, out);
@@ -66,7 +71,8 @@ void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
 }
 
 LensKernels lens_table(const char* name) {
-  return {name, &linearize_lenses, &multiply_lenses, &try_lenses, &multiply_by_lenses, &lens_residuals};
+  return {name,        &linearize_lenses,   &multiply_lenses, &multiply_poses,
+          &try_lenses, &multiply_by_lenses, &lens_residuals};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -46,7 +46,8 @@ struct LensTiles {
 /// records of the points' slots, T_l = sum T over the observations through one lens, follow them
 /// in T. `lens` has, for each observation and block of its lens, what the products between the
 /// lens and itself or the image need: with J the lens's columns,
-///   C = Lm^T J,   G = Lm^-1 (J - B T_l^T),   so that a^T G = J_a^T J - T_a T_l^T for C_a = Lm^T J_a:
+///   C = Lm^T J,   G = Lm^-1 (J - B T_l^T),   so that a^T G = J_a^T J - T_a T_l^T for C_a = Lm^T
+///   J_a:
 /// C's two rows (8 each), G's two rows, then their ninths: C (2), G (2), 4 unused.
 struct LensRecords {
   Records image;
@@ -72,7 +73,7 @@ inline std::uint64_t slots_before(const LensTracks& tracks, const Chunk& chunk, 
 struct LensTrialInput {
   const Batches* batches;
   const LensTracks* tracks;
-  LensState held;  ///< with the step
+  LensState held;   ///< with the step
   LensState tried;  ///< stepped; its points are not read
   const double* factors;
   int inner_iterations;
@@ -97,11 +98,13 @@ struct LensKernels {
   /// As Kernels::linearize, with the slots' and the lenses' records.
   void (*linearize)(const LensEliminateInput&, const Chunk&, const LensRecords&,
                     EliminateOutput& out);
-  /// Adds to the sums of a slice what concerns lenses' blocks: all of their diagonal blocks, and the
-  /// tiles of a lens with itself or an image of its own. Pairs of an image and another's lens are
-  /// pairs of T records like any other.
+  /// Adds to the sums of a slice what concerns lenses' blocks: all of their diagonal blocks, and
+  /// the tiles of a lens with itself or an image of its own. Pairs of an image and another's lens
+  /// are pairs of T records like any other.
   void (*products)(const LensTracks&, const LensTiles&, const Chunks&, const Chunk&,
                    const LensRecords&, double* diagonal, double* tiles);
+  /// As Kernels::pairs, of images whose blocks are poses alone.
+  void (*pose_pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
   /// As Kernels::trial; newly_behind is not counted.
   void (*trial)(const LensTrialInput&, const Chunk&, TrialOutput& out);
   /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, likewise by blocks.

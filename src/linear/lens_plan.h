@@ -14,8 +14,8 @@ namespace sheaf {
 WorkCounts estimate_lens_work(const LensArrangement& arranged, bool points_held, Clusters& clusters,
                               Threads& threads);
 
-/// As it is once pairs are listed: blocks of images and of lenses alike count as images. clusters: as
-/// estimated.
+/// As it is once pairs are listed: blocks of images and of lenses alike count as images. clusters:
+/// as estimated.
 WorkCounts count_lens_work(const LensArrangement& arranged, const LensChunks& chunks,
                            const WorkCounts& estimate);
 

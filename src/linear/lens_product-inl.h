@@ -84,14 +84,12 @@ HWY_INLINE void first_lens_sweep(const LensProductInput& in, std::uint64_t batch
   for (int b = 0; b < tracks.most_blocks; ++b) {
     load_block(in.x, LensBlocks(tracks, batch, b), lane, x);
     for (int r = 0; r < 2; ++r)
-      for (int i = 0; i < 9; ++i)
-        e[r] = fma(load(lens + kLanes * lens_field(b, r, i)), x[i], e[r]);
+      for (int i = 0; i < 9; ++i) e[r] = fma(load(lens + kLanes * lens_field(b, r, i)), x[i], e[r]);
   }
   // Of the two factors of each product of rows, one takes the whole weight.
   scale = hn::Mul(scale, scale);
   for (int r = 0; r < 2; ++r) j.r[r] = hn::Mul(e[r], scale);
-  for (int i = 0; i < 3; ++i)
-    s[i] = fma(j.point[0][i], j.r[0], fma(j.point[1][i], j.r[1], s[i]));
+  for (int i = 0; i < 3; ++i) s[i] = fma(j.point[0][i], j.r[0], fma(j.point[1][i], j.r[1], s[i]));
   save(j, row);
 }
 

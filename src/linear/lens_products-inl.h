@@ -117,6 +117,36 @@ inline void add_slot_squares(const LensTracks& tracks, const Chunk& chunk, const
   }
 }
 
+/// As pair_products, of blocks that are poses alone: six rows, and columns in two chains, so that
+/// one product need not wait for another's sum.
+inline void pose_pair_products(const Chunks& chunks, const Chunk& chunk, const Records& from,
+                               double* tiles) {
+  for (std::uint64_t r = chunk.first_pair_run; r < chunk.end_pair_run; ++r) {
+    const PairRun run = chunks.pair_runs[r];
+    const RecordPair* pairs = &chunks.pairs[run.first];
+    double* tile = tiles + kTileDoubles * run.tile;
+    for (int column = 0; column < 8; column += kLanes) {
+      V even[6], odd[6];
+      for (int k = 0; k < 6; ++k) even[k] = odd[k] = zero();
+      for (std::uint32_t i = 0; i < run.count; ++i) {
+        const double* a = from.T + kTRecord * pairs[i].a;
+        const double* b = from.T + kTRecord * pairs[i].b;
+        for (int q = 0; q < 3; ++q) {
+          V* to = q == 1 ? odd : even;
+          const V v = load(b + 8 * q + column), loaded = load(a + 8 * q + column);
+          to[0] = fma(broadcast<0>(a + 8 * q, loaded), v, to[0]);
+          to[1] = fma(broadcast<1>(a + 8 * q, loaded), v, to[1]);
+          to[2] = fma(broadcast<2>(a + 8 * q, loaded), v, to[2]);
+          to[3] = fma(broadcast<3>(a + 8 * q, loaded), v, to[3]);
+          to[4] = fma(broadcast<4>(a + 8 * q, loaded), v, to[4]);
+          to[5] = fma(broadcast<5>(a + 8 * q, loaded), v, to[5]);
+        }
+      }
+      for (int k = 0; k < 6; ++k) add_to(hn::Add(even[k], odd[k]), tile + 8 * k + column);
+    }
+  }
+}
+
 inline void lens_products(const LensTracks& tracks, const LensTiles& tiles_of, const Chunks& chunks,
                           const Chunk& chunk, const LensRecords& from, double* diagonal,
                           double* tiles) {

@@ -58,7 +58,7 @@ class LaneKinds {
 
 /// One observation per lane as it is seen.
 struct LensView {
-  V c[24];  ///< the image's record, as far as it was asked for
+  V c[24];     ///< the image's record, as far as it was asked for
   Lane k[24];  ///< the lens's
   Lane P[3];
   LensJacobian<Lane> J;  ///< parameters: in the order of each lane's own model; 0 beyond
@@ -70,8 +70,7 @@ HWY_INLINE void take(hn::Mask<D> mask, const Lane& from, Lane& to) {
 
 template <Wanted kWanted>
 HWY_INLINE void project_kinds(LaneKinds kinds, LensView& out) {
-  if (kinds.uniform())
-    return project_on_lanes<kWanted>(kinds.kind().model, out.k, out.P, out.J);
+  if (kinds.uniform()) return project_on_lanes<kWanted>(kinds.kind().model, out.k, out.P, out.J);
   for (int r = 0; r < 2; ++r)
     for (Lane& x : out.J.parameters[r]) x = Lane(zero());
   do {

@@ -27,11 +27,10 @@ Result<LensArrangement> arrange_with_lenses(const Problem& problem, const Fixed&
   out.batches = arrange(problem, skip, threads);
   out.tracks = arrange_lenses(problem, fixed, out.batches, threads);
   if (!LensChunks::possible(out.batches, out.tracks))
-    return Error(ErrorCode::usage,
-                 "a point is seen " + std::to_string(out.batches.longest_track) +
-                     " times; with these camera models and lenses, at most " +
-                     std::to_string(Chunks::kLongestTrack) +
-                     " observations and lenses of one point can be solved for");
+    return Error(ErrorCode::usage, "a point is seen " + std::to_string(out.batches.longest_track) +
+                                       " times; with these camera models and lenses, at most " +
+                                       std::to_string(Chunks::kLongestTrack) +
+                                       " observations and lenses of one point can be solved for");
   out.columns = number_lens_columns(out.tracks, fixed);
   return out;
 }
@@ -46,6 +45,8 @@ LensSystem::LensSystem(const Problem& problem, const LensArrangement& arrangemen
       kernels_(kernels),
       lens_kernels_(lens_kernels(kernels.name)),
       threads_(threads),
+      poses_alone_(std::all_of(arrangement.tracks.lenses.begin(), arrangement.tracks.lenses.end(),
+                               [](const LensPlaces& lens) { return lens.riders == 0; })),
       layout_(arrangement.batches, arrangement.tracks, chunks_),
       stage_(arrangement.columns) {
   fill_state(problem);
@@ -139,10 +140,9 @@ Step LensSystem::propose(const StepRequest& request) {
   mean_square_ = 2 * step.cost / static_cast<double>(arranged_.batches.observations);
   const ReducedSums sums{&chunks_, tiles_.data(), diagonal_.data()};
   // w is whitened by V (1 + damping): undo the damping's part.
-  step.gradient_max = std::max(std::sqrt(gradient2 * (1 + request.damping)),
-                               stage_.gather(sums, request.damping));
-  const bool corrected =
-      coarse_ && coarse_->factor(diagonal_.data(), stage_.damping());
+  step.gradient_max =
+      std::max(std::sqrt(gradient2 * (1 + request.damping)), stage_.gather(sums, request.damping));
+  const bool corrected = coarse_ && coarse_->factor(diagonal_.data(), stage_.damping());
   step.solved = std::isfinite(square_sum) &&
                 stage_.solve(sums, request, corrected ? coarse_.get() : nullptr, step);
   return step;
@@ -172,7 +172,8 @@ void LensSystem::linearize(const StepRequest& request, std::vector<EliminateOutp
       const Chunk& chunk = chunks_.chunks[c];
       lens_kernels_.linearize(in, chunk, records, outputs[s]);
       kernels_.diagonal(arranged_.batches, chunks_, chunk, records.image, diagonal);
-      kernels_.pairs(chunks_, chunk, records.image, tiles);
+      (poses_alone_ ? lens_kernels_.pose_pairs : kernels_.pairs)(chunks_, chunk, records.image,
+                                                                 tiles);
       kernels_.pairs(lists_.slots, lists_.slots.chunks[c], records.image, tiles);
       lens_kernels_.products(tracks, lists_.tiles, chunks_, chunk, records, diagonal, tiles);
       if (coarse_) coarse_->add(s, chunk, records.image);
@@ -239,14 +240,10 @@ double LensSystem::step_lenses() {
 Trial LensSystem::trial() {
   Trial out;
   out.step_norm = std::max(step_images(), step_lenses());
-  const LensTrialInput in{&arranged_.batches,
-                          &arranged_.tracks,
-                          held_.view(),
-                          tried_.view(),
-                          factors_.data(),
-                          rules_.points_held ? 0 : rules_.inner_iterations,
-                          mean_square_,
-                          loss_,
+  const LensTrialInput in{&arranged_.batches, &arranged_.tracks,
+                          held_.view(),       tried_.view(),
+                          factors_.data(),    rules_.points_held ? 0 : rules_.inner_iterations,
+                          mean_square_,       loss_,
                           weights_.data()};
   std::vector<TrialOutput> outputs(num_slices());
   threads_.for_each(num_slices(), [&](std::size_t s) {

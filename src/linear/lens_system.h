@@ -39,8 +39,8 @@ struct LensRules {
 };
 
 /// Reprojection rows through lenses of any model, own or shared. What is left of a chunk after
-/// elimination are records of nine columns, as of any rows, but an observation has two or three: its
-/// image's and those of its lens's blocks. From the sums on all is as in BundleSystem.
+/// elimination are records of nine columns, as of any rows, but an observation has two or three:
+/// its image's and those of its lens's blocks. From the sums on all is as in BundleSystem.
 class LensSystem : public System {
  public:
   /// The arrangement must outlive it. Throws std::bad_alloc.
@@ -85,6 +85,7 @@ class LensSystem : public System {
   const Kernels& kernels_;
   const LensKernels& lens_kernels_;
   Threads& threads_;
+  const bool poses_alone_;  ///< nothing rides with them
   const LensScratch layout_;
   State held_, tried_;
   Buffer<double> factors_, weights_;

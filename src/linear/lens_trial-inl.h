@@ -41,9 +41,9 @@ HWY_INLINE void add_lens_coupling(const LensTrialInput& in, std::uint64_t batch,
   const LensTracks& tracks = *in.tracks;
   look<Wanted::parameters, true>(*in.batches, tracks, in.held, batch, lane, X, view);
   const std::int32_t kind = tracks.uniform_kind[batch];
-  const int count =
-      kind < 0 ? static_cast<int>(kMaxCameraParameters)
-               : static_cast<int>(parameter_count(tracks.kinds[std::size_t(kind)].model));
+  const int count = kind < 0
+                        ? static_cast<int>(kMaxCameraParameters)
+                        : static_cast<int>(parameter_count(tracks.kinds[std::size_t(kind)].model));
   V e[2], point[2][3];
   lens_motion(view, count, e);
   if (weights != nullptr)
@@ -116,9 +116,8 @@ HWY_INLINE void refine_lens_points(const LensTrialInput& in, const Batches::Grou
     const auto far = hn::And(active, hn::Gt(decrease, worth_more));
     steps_left = hn::AllFalse(D(), far) ? 0 : steps_left - 1;
     for (int i = 0; i < 3; ++i) Y[i] = hn::Add(best.X[i], d[i]);
-    const TrackCost at = steps_left > 0
-                             ? pass_lens_group<Robust, true>(in, group, lane, Y, p)
-                             : pass_lens_group<Robust, false>(in, group, lane, Y, p);
+    const TrackCost at = steps_left > 0 ? pass_lens_group<Robust, true>(in, group, lane, Y, p)
+                                        : pass_lens_group<Robust, false>(in, group, lane, Y, p);
     active = hn::And(active, hn::Lt(at.cost, best.at.cost));
     for (int i = 0; i < 3; ++i) best.X[i] = hn::IfThenElse(active, Y[i], best.X[i]);
     best.at = {hn::IfThenElse(active, at.square, best.at.square),

@@ -102,9 +102,8 @@ double explicit_seconds(const WorkCounts& c) {
 }
 double implicit_seconds(const WorkCounts& c) {
   if (c.only_formed) return std::numeric_limits<double>::infinity();
-  return coarse_seconds(c) +
-         seconds(iterations(c) * (c.any_lens ? kLensImplicitNs : kImplicitNs) *
-                 static_cast<double>(c.observations));
+  return coarse_seconds(c) + seconds(iterations(c) * (c.any_lens ? kLensImplicitNs : kImplicitNs) *
+                                     static_cast<double>(c.observations));
 }
 
 /// Seconds a step.
@@ -178,12 +177,10 @@ Plan plan_solver(const WorkCounts& c) {
                explicit_cg = explicit_seconds(c), implicit_cg = implicit_seconds(c);
   const std::string counts = std::to_string(c.images) + " images, " + std::to_string(c.tiles) +
                              " blocks, " + std::to_string(c.pairs) + " pairs";
-  const std::string costs = ": about " + milliseconds(dense) + " a step dense, " +
-                            milliseconds(sparse) + " sparse, " + milliseconds(explicit_cg) +
-                            " iterative explicit" +
-                            (c.only_formed ? std::string()
-                                           : ", " + milliseconds(implicit_cg) +
-                                                 " iterative implicit");
+  const std::string costs =
+      ": about " + milliseconds(dense) + " a step dense, " + milliseconds(sparse) + " sparse, " +
+      milliseconds(explicit_cg) + " iterative explicit" +
+      (c.only_formed ? std::string() : ", " + milliseconds(implicit_cg) + " iterative implicit");
   const bool too_long = c.longest_track > Chunks::kLongestTrack;
   if (too_long)
     return {SolverKind::implicit_cg, counts + ": a point is seen " +

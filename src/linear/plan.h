@@ -34,11 +34,11 @@ struct WorkCounts {
   std::uint32_t longest_track = 0;
   std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
   bool lens_shared = false;
-  bool images_couple = true;  ///< some free point or shared lens couples images
-  bool weighted = false;      ///< a loss leaves a weight for each observation
-  bool dogleg = false;        ///< the gradient is summed by image, steps are blended
-  bool only_formed = false;   ///< there is no implicit product
-  bool any_lens = false;      ///< lenses of any model: implicit products are dearer, and double
+  bool images_couple = true;      ///< some free point or shared lens couples images
+  bool weighted = false;          ///< a loss leaves a weight for each observation
+  bool dogleg = false;            ///< the gradient is summed by image, steps are blended
+  bool only_formed = false;       ///< there is no implicit product
+  bool any_lens = false;          ///< lenses of any model: implicit products are dearer, and double
   std::uint64_t other_bytes = 0;  ///< held besides
 
   static constexpr std::uint64_t kExactImages = 20000;

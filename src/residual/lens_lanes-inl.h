@@ -43,11 +43,10 @@ HWY_INLINE Lane sqrt(const Lane& a) { return Lane(hn::Sqrt(a.v)); }
 
 /// Of 0 <= q <= 1, within 2 ulp: tan(k pi / 8 + t) with |t| <= pi / 16, then the series of t.
 HWY_INLINE V atan_unit(V q) {
-  const V eighth = set(0.41421356237309504880);  // tan(pi / 8)
-  const auto past_first = hn::Gt(q, set(0.19891236737965800691));  // tan(pi / 16)
+  const V eighth = set(0.41421356237309504880);                     // tan(pi / 8)
+  const auto past_first = hn::Gt(q, set(0.19891236737965800691));   // tan(pi / 16)
   const auto past_second = hn::Gt(q, set(0.66817863791929891999));  // tan(3 pi / 16)
-  const V c =
-      hn::IfThenElse(past_second, set(1.0), hn::IfThenElse(past_first, eighth, zero()));
+  const V c = hn::IfThenElse(past_second, set(1.0), hn::IfThenElse(past_first, eighth, zero()));
   const V base = hn::IfThenElse(past_second, set(0.78539816339744830962),
                                 hn::IfThenElse(past_first, set(0.39269908169872415481), zero()));
   const V t = hn::Div(hn::Sub(q, c), fma(q, c, set(1.0)));

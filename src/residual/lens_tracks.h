@@ -13,8 +13,8 @@
 namespace sheaf {
 
 /// Where the free parameters of a lens stand. A camera block has nine columns, one block for each
-/// image: its pose, then three more. Up to three parameters of a lens of one image alone ride there;
-/// all others have blocks of the lens's own, one or two of nine columns.
+/// image: its pose, then three more. Up to three parameters of a lens of one image alone ride
+/// there; all others have blocks of the lens's own, one or two of nine columns.
 struct LensPlaces {
   static constexpr int kHeld = -1;
   static constexpr int kRiders = 3;

@@ -214,6 +214,15 @@ std::array<double, 3> LensScene::point(Random& random) const {
   return {r * scale * d[0], r * scale * d[1], r * z};
 }
 
+std::array<double, 3> LensScene::ray(std::uint32_t image,
+                                     const std::array<double, 3>& point) const {
+  const Matrix3<double>& R = rotations_[image];
+  const Vector3<double> P = in_camera(R, poses_[image].translation, point);
+  const double length = std::sqrt(P[0] * P[0] + P[1] * P[1] + P[2] * P[2]);
+  return multiply(Matrix3<double>{R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8]},
+                  Vector3<double>{P[0] / length, P[1] / length, P[2] / length});
+}
+
 bool LensScene::sees(std::uint32_t image, const std::array<double, 3>& point,
                      std::array<double, 2>& pixel) const {
   const Vector3<double> P = in_camera(rotations_[image], poses_[image].translation, point);

@@ -26,6 +26,9 @@ class LensScene {
   /// A place that most images have in view.
   std::array<double, 3> point(class Random& random) const;
 
+  /// Direction from the image's centre to the point, in the world, of length 1.
+  std::array<double, 3> ray(std::uint32_t image, const std::array<double, 3>& point) const;
+
   /// Whether the point lies within the field of view and the frame, and where; pixels as exact as
   /// the lens's formula.
   bool sees(std::uint32_t image, const std::array<double, 3>& point,

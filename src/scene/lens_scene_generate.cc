@@ -47,6 +47,19 @@ Track choose_views(const LensScene& scene, const std::array<double, 3>& point, s
   return track;
 }
 
+/// Whether some ray makes an angle of a degree with the first: a point between rays that noise
+/// makes parallel would wander off.
+bool has_parallax(const LensScene& scene, const std::array<double, 3>& point, const Track& track) {
+  if (track.size() < 2) return false;
+  const std::array<double, 3> a = scene.ray(track[0].image, point);
+  return std::any_of(track.begin() + 1, track.end(), [&](const View& view) {
+    const std::array<double, 3> b = scene.ray(view.image, point);
+    const Vector3<double> across = cross(a, b);
+    constexpr double kSine = 0.0174;
+    return across[0] * across[0] + across[1] * across[1] + across[2] * across[2] > kSine * kSine;
+  });
+}
+
 /// The places where points are looked for walk once around the ring, so that images share them
 /// evenly.
 Result<std::vector<Track>> make_tracks(const SceneOptions& o, const LensScene& scene,
@@ -63,13 +76,15 @@ Result<std::vector<Track>> make_tracks(const SceneOptions& o, const LensScene& s
         (static_cast<double>(i) + random.uniform()) / static_cast<double>(o.points);
     const auto first = static_cast<std::uint32_t>(share * images) % images;
     std::array<double, 3> point;
-    for (int attempt = 0; attempt < kAttempts && tracks[i].size() < 2; ++attempt) {
+    bool found = false;
+    for (int attempt = 0; attempt < kAttempts && !found; ++attempt) {
       point = scene.point(random);
       tracks[i] = choose_views(scene, point, first, count, lengths[i], random);
+      found = has_parallax(scene, point, tracks[i]);
     }
-    if (tracks[i].size() < 2)
-      return Error(ErrorCode::usage,
-                   "no place for point " + std::to_string(i) + " was found that two images see");
+    if (!found)
+      return Error(ErrorCode::usage, "no place for point " + std::to_string(i) +
+                                         " was found that two images see under an angle");
     points.insert(points.end(), point.begin(), point.end());
   }
   return tracks;

@@ -100,8 +100,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   Plan leanest{SolverKind::implicit_cg, "", takes_mixed(SolverKind::implicit_cg, counts, options)};
   const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
-      !counts.only_formed &&
-      lean <= options.memory_limit_bytes) {
+      !counts.only_formed && lean <= options.memory_limit_bytes) {
     leanest.reason = std::string(to_string(choice.plan.kind)) + " would need " +
                      megabytes(choice.forecast_bytes) + ", over the limit of " +
                      megabytes(options.memory_limit_bytes);

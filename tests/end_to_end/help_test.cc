@@ -28,6 +28,9 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--field-of-view"});
   if (verb == "photometric")
     options.insert({"--output",
+                    "--ply",
+                    "--pictures",
+                    "--memory-limit",
                     "--intrinsics",
                     "--interpolation",
                     "--brightness",
@@ -56,9 +59,6 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--disturb-rotation",
                     "--disturb-center",
                     "--seed",
-                    "--ply",
-                    "--pictures",
-                    "--memory-limit",
                     "--anchor",
                     "--anchor-loss",
                     "--rows"});

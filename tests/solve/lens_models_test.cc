@@ -125,12 +125,11 @@ std::vector<Problem> mixtures() {
   for (CameraModel model : all_models()) lenses.push_back(ordinary(model));
   const Problem one = thinned(disturbed(lenses, lenses.size(), 21, 5), 6);
   const Problem two = thinned(disturbed(lenses, 2 * lenses.size(), 11, 7), 8);
-  const Problem some = thinned(disturbed({ordinary(CameraModel::opencv),
-                                          ordinary(CameraModel::full_opencv),
-                                          ordinary(CameraModel::opencv),
-                                          ordinary(CameraModel::thin_prism_fisheye)},
-                                         6, 21, 9),
-                               10);
+  const Problem some =
+      thinned(disturbed({ordinary(CameraModel::opencv), ordinary(CameraModel::full_opencv),
+                         ordinary(CameraModel::opencv), ordinary(CameraModel::thin_prism_fisheye)},
+                        6, 21, 9),
+              10);
   return {one, two, some};
 }
 
@@ -211,10 +210,10 @@ TEST(LensModels, EveryInstructionSetAndThreadCountEndsAlike) {
 
 /// Enough of everything that all parameters are well determined.
 Problem determined(bool shared) {
-  const Problem problem = thinned(disturbed({ordinary(CameraModel::opencv),
-                                             ordinary(CameraModel::radial_fisheye)},
-                                            10, 300, 13),
-                                  14);
+  const Problem problem =
+      thinned(disturbed({ordinary(CameraModel::opencv), ordinary(CameraModel::radial_fisheye)}, 10,
+                        300, 13),
+              14);
   return shared ? problem : unshared(problem);
 }
 
@@ -255,8 +254,8 @@ TEST(LensModels, WhatIsHeldStaysBitForBit) {
       for (std::size_t k = 0; k < kMaxCameraParameters; ++k) {
         const double before = start.cameras[c].parameters[k],
                      after = run.problem.cameras[c].parameters[k];
-        const bool free = k < parameter_count(start.cameras[c].model) && c != 0 &&
-                          (principal >> k & 1) == 0;
+        const bool free =
+            k < parameter_count(start.cameras[c].model) && c != 0 && (principal >> k & 1) == 0;
         EXPECT_EQ(before == after, !free) << "camera " << c << ", " << k;
       }
     }

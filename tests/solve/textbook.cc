@@ -36,7 +36,7 @@ Places::Places(const Problem& p, const Fixed& fixed) {
   for (std::size_t i = 0; i < p.cameras.size(); ++i)
     for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
       lens.push_back(k < parameter_count(p.cameras[i].model) && (held[i] >> k & 1) == 0 ? count++
-                                                                                       : -1);
+                                                                                        : -1);
   for (std::size_t i = 0; i < p.points.size(); ++i) point.push_back(fixed.points ? -1 : count++);
 }
 
@@ -176,8 +176,7 @@ Problem first_points(const Problem& p, std::uint32_t points) {
 }
 
 void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
-                          const Loss& loss, PointParametrisation points,
-                          CameraSolverKind solver) {
+                          const Loss& loss, PointParametrisation points, CameraSolverKind solver) {
   const Places at(start, fixed);
   const Charts charts(start, points);
   const ScaledLoss scaled{loss.kind, loss.scale_px};

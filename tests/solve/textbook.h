@@ -51,8 +51,8 @@ std::vector<double> solve_dense(std::vector<double> A, std::vector<double> b);
 /// Steps every free parameter by x.
 void move(Problem& p, const Places& at, const std::vector<double>& x, const Charts& charts);
 
-/// One step of `solve` with this damping against the textbook's: cost, trial cost, predicted decrease
-/// and, where it is accepted, the state.
+/// One step of `solve` with this damping against the textbook's: cost, trial cost, predicted
+/// decrease and, where it is accepted, the state.
 void expect_textbook_step(const Problem& start, const Fixed& fixed, double damping,
                           const Loss& loss = {},
                           PointParametrisation points = PointParametrisation::xyz,
