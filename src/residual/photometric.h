@@ -117,7 +117,7 @@ struct PhotometricInput {
 };
 
 /// Of the brightness alone, with what the rows hold taken out: 8 doubles a lane's field, five
-/// fields a batch: (alpha, alpha), (alpha, beta), (beta, beta), then -J^T r of both.
+/// fields a batch: (alpha, alpha), (alpha, beta), (beta, beta), then J^T r of both.
 constexpr std::size_t kBrightnessBatch = 5 * 8;
 
 struct PhotometricOutput {

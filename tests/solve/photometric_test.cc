@@ -358,7 +358,7 @@ TEST_F(PhotometricCourse, StartsWhereItIsKnownTo) {
 
 TEST_F(PhotometricCourse, CompatibleSettingsGoBelowTheKnownRun) {
   const PhotometricSummary summary = refine_photometric(problem_, compatible()).value();
-  EXPECT_LT(2 * summary.solve.final_cost, 2.85e6);
+  EXPECT_LT(2 * summary.solve.final_cost, 2.909e6);  // where g2o ends
 }
 
 TEST_F(PhotometricCourse, BrightnessExplainsMuchOfTheRest) {
