@@ -109,7 +109,7 @@ python3 "$root/bench/side_by_side.py" --problems $problems --solvers "$solvers" 
   --peers "$peers" --threads "${SHEAF_BENCH_THREADS:-1,2}" --runs "${SHEAF_BENCH_RUNS:-5}" \
   --machine "$build/machine.json" --out "$build/results"
 mkdir -p "$root/$plots"
-cp "$build"/results/*.svg "$root/$plots/"
+cp "$build"/results/cost-*.svg "$root/$plots/"
 python3 "$root/bench/write_pages.py" "$build/results/results.json" "$root" "$plots" "${kernels[@]}"
 if [ -n "${SHEAF_LADDER:-}" ]; then
   echo "== the ladder" >&2
