@@ -72,15 +72,19 @@ def find_program(name, folders):
 def run_once(program, name, config, problem, threads, options, folder):
     """One run in a fresh process: the peer's JSON, with the independent final cost."""
     final = os.path.join(folder, "final.txt")
-    line = [program, problem, "--config", config, "--threads", str(threads), "--max-iterations",
-            str(options.max_iterations), "--time-limit", str(options.time_limit), "--out", final]
+    line = [os.path.abspath(program), os.path.abspath(problem), "--config", config, "--threads",
+            str(threads), "--max-iterations", str(options.max_iterations),
+            "--time-limit", str(options.time_limit), "--out", final]
     if os.path.exists(final):
         os.remove(final)
     # Libraries inside a peer (BLAS, OpenMP) get the same count as the peer.
-    count = {k: str(threads) for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    environment = {**os.environ,
+                   **{k: str(threads) for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}}
+    if os.sep in environment.get("SHEAF_COMMAND", ""):
+        environment["SHEAF_COMMAND"] = os.path.abspath(environment["SHEAF_COMMAND"])
     limit = options.time_limit
     run = {"name": name, "config": config, "threads": threads, "limit_s": limit}
-    done = run_program(line, {**os.environ, **count}, 60 + 2 * limit, options.memory_gb)
+    done = run_program(line, environment, 60 + 2 * limit, options.memory_gb, folder)
     if done is None:
         return {**run, "failed": "did not end in time", "cut": True}
     if done.returncode != 0:
@@ -99,16 +103,17 @@ def run_once(program, name, config, problem, threads, options, folder):
     return run
 
 
-def run_program(line, environment, timeout, memory_gb):
+def run_program(line, environment, timeout, memory_gb, folder):
     """The finished process, or None when it had to be ended. Memory is limited so that a greedy peer
-    fails by itself and not the machine with it."""
+    fails by itself and not the machine with it. It runs in `folder`, where what it leaves (rootba
+    writes a debug.txt) is swept up."""
     def limit_memory():
         if memory_gb:
             resource.setrlimit(resource.RLIMIT_AS, (int(memory_gb * 1e9),) * 2)
 
     child = subprocess.Popen(line, env=environment, stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE, text=True, start_new_session=True,
-                             preexec_fn=limit_memory)
+                             preexec_fn=limit_memory, cwd=folder)
     try:
         out, err = child.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
