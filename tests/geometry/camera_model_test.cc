@@ -14,11 +14,13 @@
 #include <vector>
 
 #include "geometry/dual.h"
+#include "geometry/lenses.h"
 
 namespace sheaf {
 namespace {
 
 using test::Dual;
+using test::ordinary;
 using Real = long double;
 
 constexpr std::array<CameraModel, kCameraModels> kAll{CameraModel::bal,
@@ -34,40 +36,6 @@ constexpr std::array<CameraModel, kCameraModels> kAll{CameraModel::bal,
                                                       CameraModel::thin_prism_fisheye,
                                                       CameraModel::fov,
                                                       CameraModel::eucm};
-
-/// Ordinary parameters of a model; the recorded values below are made with the same.
-Camera ordinary(CameraModel model) {
-  switch (model) {
-    case CameraModel::bal:
-      return {model, {500, -0.05, 0.01}};
-    case CameraModel::simple_pinhole:
-      return {model, {500, 320, 240}};
-    case CameraModel::pinhole:
-      return {model, {500, 510, 320, 240}};
-    case CameraModel::simple_radial:
-      return {model, {500, 320, 240, -0.05}};
-    case CameraModel::radial:
-      return {model, {500, 320, 240, -0.05, 0.01}};
-    case CameraModel::opencv:
-      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003}};
-    case CameraModel::full_opencv:
-      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003, 0.004, 0.03, -0.02, 0.01}};
-    case CameraModel::opencv_fisheye:
-      return {model, {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.0004}};
-    case CameraModel::simple_radial_fisheye:
-      return {model, {300, 320, 240, -0.02}};
-    case CameraModel::radial_fisheye:
-      return {model, {300, 320, 240, 0.02, -0.006}};
-    case CameraModel::thin_prism_fisheye:
-      return {model,
-              {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.003, 0.002, -0.0004, 0.001, -0.002}};
-    case CameraModel::fov:
-      return {model, {300, 310, 320, 240, 0.9}};
-    case CameraModel::eucm:
-      return {model, {300, 310, 320, 240, 0.65, 1.1}};
-  }
-  return {};
-}
 
 bool is_fisheye(CameraModel model) {
   return model == CameraModel::opencv_fisheye || model == CameraModel::simple_radial_fisheye ||

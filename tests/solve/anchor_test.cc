@@ -12,9 +12,12 @@
 #include "geometry/loss.h"
 #include "geometry/rotation.h"
 #include "sheaf/sheaf.h"
+#include "solve/photometric_scenes.h"
 
 namespace sheaf {
 namespace {
+
+using test::project;
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
@@ -30,16 +33,6 @@ PhotometricOptions plain_options() {
   options.affine_brightness = false;
   options.loss = Huber{10};
   return options;
-}
-
-std::array<double, 2> project(const PhotometricProblem& p, std::size_t image, std::size_t point) {
-  const Pose& pose = p.poses[image];
-  const Vector3<double> P = multiply(
-      matrix_from_quaternion(pose.rotation),
-      Vector3<double>{p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
-  const double z = P[2] + pose.translation[2];
-  return {p.camera.fx * (P[0] + pose.translation[0]) / z + p.camera.cx,
-          p.camera.fy * (P[1] + pose.translation[1]) / z + p.camera.cy};
 }
 
 /// Share of the measured places that are within a tenth of a pixel of the truth's.

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <random>
 
+#include "geometry/lenses.h"
 #include "io/models.h"
 #include "sheaf/sheaf.h"
 #include "solve/scenes.h"
@@ -17,40 +18,8 @@
 namespace sheaf {
 namespace {
 
+using test::ordinary;
 using test::seen_by;
-
-Camera ordinary(CameraModel model) {
-  switch (model) {
-    case CameraModel::bal:
-      return {model, {500, -0.05, 0.01}};
-    case CameraModel::simple_pinhole:
-      return {model, {500, 320, 240}};
-    case CameraModel::pinhole:
-      return {model, {500, 510, 320, 240}};
-    case CameraModel::simple_radial:
-      return {model, {500, 320, 240, -0.05}};
-    case CameraModel::radial:
-      return {model, {500, 320, 240, -0.05, 0.01}};
-    case CameraModel::opencv:
-      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003}};
-    case CameraModel::full_opencv:
-      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003, 0.004, 0.03, -0.02, 0.01}};
-    case CameraModel::opencv_fisheye:
-      return {model, {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.0004}};
-    case CameraModel::simple_radial_fisheye:
-      return {model, {300, 320, 240, -0.02}};
-    case CameraModel::radial_fisheye:
-      return {model, {300, 320, 240, 0.02, -0.006}};
-    case CameraModel::thin_prism_fisheye:
-      return {model,
-              {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.003, 0.002, -0.0004, 0.001, -0.002}};
-    case CameraModel::fov:
-      return {model, {300, 310, 320, 240, 0.9}};
-    case CameraModel::eucm:
-      return {model, {300, 310, 320, 240, 0.65, 1.1}};
-  }
-  return {};
-}
 
 /// Noise on the measurements, a disturbed start.
 Problem disturbed(const std::vector<Camera>& lenses, std::size_t images, std::size_t points,

@@ -19,9 +19,12 @@
 #include "residual/photometric.h"
 #include "sheaf/sheaf.h"
 #include "solve/patch_level.h"
+#include "solve/photometric_scenes.h"
 
 namespace sheaf {
 namespace {
+
+using test::project;
 
 /// After a Sim(3) by the camera centres: rotations, and where true points are seen from the
 /// estimated poses.
@@ -35,16 +38,6 @@ Problem shell_of(const PhotometricProblem& p) {
   for (const Pose& pose : p.poses) out.add_image(pose, Camera{});
   out.points = p.points;
   return out;
-}
-
-std::array<double, 2> project(const PhotometricProblem& p, std::size_t image, std::size_t point) {
-  const Pose& pose = p.poses[image];
-  const Vector3<double> P = multiply(
-      matrix_from_quaternion(pose.rotation),
-      Vector3<double>{p.points[3 * point], p.points[3 * point + 1], p.points[3 * point + 2]});
-  const double z = P[2] + pose.translation[2];
-  return {p.camera.fx * (P[0] + pose.translation[0]) / z + p.camera.cx,
-          p.camera.fy * (P[1] + pose.translation[1]) / z + p.camera.cy};
 }
 
 /// Projections are free of gauge: the estimate's own points seen by its own poses.

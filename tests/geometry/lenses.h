@@ -1,0 +1,43 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "sheaf/camera.h"
+
+namespace sheaf::test {
+
+/// Ordinary parameters of a model; what camera_model_test records of COLMAP is made with the same.
+inline Camera ordinary(CameraModel model) {
+  switch (model) {
+    case CameraModel::bal:
+      return {model, {500, -0.05, 0.01}};
+    case CameraModel::simple_pinhole:
+      return {model, {500, 320, 240}};
+    case CameraModel::pinhole:
+      return {model, {500, 510, 320, 240}};
+    case CameraModel::simple_radial:
+      return {model, {500, 320, 240, -0.05}};
+    case CameraModel::radial:
+      return {model, {500, 320, 240, -0.05, 0.01}};
+    case CameraModel::opencv:
+      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003}};
+    case CameraModel::full_opencv:
+      return {model, {500, 510, 320, 240, -0.05, 0.01, 0.002, -0.003, 0.004, 0.03, -0.02, 0.01}};
+    case CameraModel::opencv_fisheye:
+      return {model, {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.0004}};
+    case CameraModel::simple_radial_fisheye:
+      return {model, {300, 320, 240, -0.02}};
+    case CameraModel::radial_fisheye:
+      return {model, {300, 320, 240, 0.02, -0.006}};
+    case CameraModel::thin_prism_fisheye:
+      return {model,
+              {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.003, 0.002, -0.0004, 0.001, -0.002}};
+    case CameraModel::fov:
+      return {model, {300, 310, 320, 240, 0.9}};
+    case CameraModel::eucm:
+      return {model, {300, 310, 320, 240, 0.65, 1.1}};
+  }
+  return {};
+}
+
+}  // namespace sheaf::test
