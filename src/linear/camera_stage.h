@@ -20,7 +20,6 @@ class CameraStage {
 
   /// Right-hand side and damping of the columns; returns the largest |rhs_i| / |J_i|, the scaled
   /// gradient of the free columns.
-  /// gradient; may be null) counts as a row of its own.
   double gather(const ReducedSums& sums, double lambda);
 
   /// False where no finite step came out.

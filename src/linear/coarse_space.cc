@@ -17,10 +17,12 @@ constexpr int kRows = 7;  // of an image's nine that Z moves
 constexpr std::size_t kFewestImages = 64;
 /// Measured: 8 images to a cluster need the least time from 257 to 1778 images (6 to 12 within a
 /// tenth of it). E's factor, solves and sums must stay cheap beside S's products: where clusters
-/// or pairs of them are too many, clusters grow.
+/// or pairs of them are too many, clusters grow. On final-13682's 29 M observations 255 clusters
+/// with 14530 pairs halve the iterations of 118 with 4188; 793 with 81855 halve them again and
+/// cost more than that saves. On venice-1778's 5 M the larger ones save nothing.
 constexpr std::size_t kImagesEach = 8;
 constexpr std::int32_t kMostClusters = 256;
-constexpr std::uint64_t kMostPairs = 6144;
+constexpr std::uint64_t kMostPairs = 6144, kObservationsPerPair = 1500;
 /// E is scaled to a unit diagonal; this is added to it, so that modes which nothing but rounding
 /// holds do not spoil the others.
 constexpr double kRegularisation = 1e-10;
@@ -31,16 +33,18 @@ Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads
   constexpr std::size_t kSample = 16;
   const std::size_t images = columns.num_images();
   if (images < kFewestImages) return {};
+  const std::uint64_t most_pairs =
+      std::max(kMostPairs, batches.observations / kObservationsPerPair);
   const Covisibility graph(batches, images, threads);
   for (std::size_t each = std::max(kImagesEach, images / kMostClusters); each <= images;
        each += each / 2) {
     Clusters clusters = cluster_images(graph, columns, each);
     if (clusters.count > kMostClusters) continue;
     // A sample of the points shows most of those that have too many pairs.
-    if (count_cluster_pairs(number_cluster_pairs(batches, clusters, threads, kSample)) > kMostPairs)
+    if (count_cluster_pairs(number_cluster_pairs(batches, clusters, threads, kSample)) > most_pairs)
       continue;
     clusters.pairs = number_cluster_pairs(batches, clusters, threads);
-    if (count_cluster_pairs(clusters.pairs) <= kMostPairs) return clusters;
+    if (count_cluster_pairs(clusters.pairs) <= most_pairs) return clusters;
   }
   return {};  // hundreds of parts that share nothing
 }
