@@ -7,8 +7,17 @@
 
 namespace sheaf {
 
-ConjugateGradients::ConjugateGradients(const Columns& columns) : columns_(columns) {
-  const std::size_t padded = (static_cast<std::size_t>(columns.count) + 7) / 8 * 8;
+namespace {
+
+std::size_t padded_length(const Columns& columns) {
+  return (static_cast<std::size_t>(columns.count) + 7) / 8 * 8;
+}
+
+}  // namespace
+
+ConjugateGradients::ConjugateGradients(const Columns& columns)
+    : columns_(columns), modes_(padded_length(columns)) {
+  const std::size_t padded = padded_length(columns);
   for (Buffer<double>* v : {&r_, &z_, &p_, &q_}) {
     v->allocate(padded);
     v->fill(0);
@@ -19,7 +28,7 @@ ConjugateGradients::ConjugateGradients(const Columns& columns) : columns_(column
 }
 
 std::uint64_t ConjugateGradients::bytes() const {
-  return path_.bytes() + 4 * r_.bytes() + 2 * image_x_.bytes();
+  return path_.bytes() + modes_.bytes() + 4 * r_.bytes() + 2 * image_x_.bytes();
 }
 
 void ConjugateGradients::start(const double* b, Buffer<double>& x) {

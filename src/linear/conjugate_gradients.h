@@ -7,6 +7,7 @@
 
 #include "linear/camera_solver.h"
 #include "linear/columns.h"
+#include "linear/recycled_modes.h"
 #include "linear/steihaug_path.h"
 #include "platform/buffer.h"
 
@@ -26,7 +27,8 @@ constexpr std::size_t kImageVector = 16;
 /// Stops when an iteration's part of the decrease Q = -1/2 x.(b + r) of the quadratic model falls
 /// below `forcing` of the mean part so far (Nash and Sofer 1990), or the residual is at rounding;
 /// with a radius, also where a step would leave it or finds no curvature: there the last step goes
-/// on to the boundary (Steihaug 1983).
+/// on to the boundary (Steihaug 1983). What one run shows of the system's small eigenvalues
+/// preconditions the next.
 class ConjugateGradients {
  public:
   explicit ConjugateGradients(const Columns& columns);
@@ -37,7 +39,8 @@ class ConjugateGradients {
     const double* b = system.vectors->rhs.data();
     start(b, x);
     if (system.dogleg) path_.begin(r_);
-    M.solve(r_.data(), z_.data());
+    modes_.begin();
+    precondition(M);
     copy(z_, p_);
     double rz = dot(r_, z_);
     const double rz_start = rz;
@@ -50,18 +53,25 @@ class ConjugateGradients {
       const double curvature = dot(p_, q_);
       const double alpha = rz / curvature, most = longest_step(system, x);
       const bool cut = std::isfinite(most) && (most <= alpha || !(curvature > 0));
-      if (!cut && !(curvature > 0)) return {iteration > 1, iteration, r_.data()};
+      if (!cut && !(curvature > 0)) {
+        modes_.clear();
+        return {iteration > 1, iteration, r_.data()};
+      }
+      modes_.add(z_.data(), rz, alpha);
       axpy(cut ? most : alpha, p_, x);
       axpy(cut ? -most : -alpha, q_, r_);
       if (system.dogleg) path_.add(x, r_, length(system, x));
       if (cut) return {true, iteration, r_.data(), true};
       const double before = model;
       model += 0.5 * alpha * rz;
-      M.solve(r_.data(), z_.data());
+      precondition(M);
       const double rz_next = dot(r_, z_);
       const bool small =
           iteration >= kMinIterations && iteration * (model - before) < system.forcing * model;
-      if (small || rz_next <= 1e-28 * rz_start) return {true, iteration, r_.data()};
+      if (small || rz_next <= 1e-28 * rz_start) {
+        modes_.end(rz_next);
+        return {true, iteration, r_.data()};
+      }
       scale_add(rz_next / rz, z_, p_);
       rz = rz_next;
     }
@@ -79,6 +89,12 @@ class ConjugateGradients {
   /// trafalgar-like scenes a trust region step.
   static constexpr int kMinIterations = 6;
 
+  /// z = H r
+  template <class Preconditioner>
+  void precondition(const Preconditioner& M) {
+    M.solve(r_.data(), z_.data());
+    modes_.correct(r_.data(), z_.data());
+  }
   void start(const double* b, Buffer<double>& x);
   void apply(ImageOperator& S, const double* damping);
   SteihaugPath::Metric metric(const CameraSystem& system) const;
@@ -92,7 +108,8 @@ class ConjugateGradients {
   static void scale_add(double beta, const Buffer<double>& z, Buffer<double>& p);
 
   const Columns& columns_;
-  SteihaugPath path_;  ///< for a dogleg
+  SteihaugPath path_;    ///< for a dogleg
+  RecycledModes modes_;  ///< from run to run
   Buffer<double> r_, z_, p_, q_, image_x_, image_y_;
 };
 

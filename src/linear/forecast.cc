@@ -8,6 +8,7 @@
 #include "linear/block_rows.h"
 #include "linear/coarse_space.h"
 #include "linear/kernels.h"
+#include "linear/recycled_modes.h"
 #include "linear/sparse_cholesky.h"
 #include "linear/steihaug_path.h"
 #include "platform/pages.h"
@@ -68,6 +69,7 @@ void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, 
   sum.add(c.images, kBlock + 4);
   sum.add(c.columns, 8, 4);
   sum.add(c.images, kVector, 2);
+  sum.add(RecycledModes::most_bytes(c.columns), 1);
   if (plan.kind == SolverKind::explicit_cg) {
     sum.add(2 * c.tiles + c.images, 8 * kBlockEntry);  // in the end double, mixed or not
     sum.add(2 * c.tiles + c.images, 4);
