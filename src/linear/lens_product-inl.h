@@ -125,6 +125,129 @@ HWY_INLINE void scatter_to_lenses(const double* rows, const double* ninth, const
   }
 }
 
+/// Whether all lanes of a batch look through one kind of lens and, where that has blocks of its
+/// own, through one lens. Then rows need no common form: the lens's free parameters stand one after
+/// another, and what a shared lens gets is summed lane by lane over a group.
+HWY_INLINE bool is_plain(const LensTracks& tracks, std::uint64_t batch) {
+  const std::int32_t kind = tracks.uniform_kind[batch];
+  return kind >= 0 && (tracks.kinds[static_cast<std::size_t>(kind)].blocks == 0 ||
+                       tracks.uniform_lens[batch] >= 0);
+}
+
+/// A (2x3, du/dP), P, R and e of an observation, kept as this many vectors; then two for each free
+/// parameter.
+constexpr int kPlainFields = 20;
+
+/// As first_lens_sweep.
+HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batch, int lane,
+                                  const V* X, V scale, double* saved, V* s) {
+  const LensTracks& tracks = *in.of.tracks;
+  const Batches& batches = *in.of.batches;
+  LensView view;
+  look<Wanted::parameters, false>(batches, tracks, in.of.at, batch, lane, X, view);
+  V x[9];
+  load_image(in.x, &batches.image[8 * batch + lane], batches.uniform[batch], x);
+  const V P0 = view.P[0].v, P1 = view.P[1].v, P2 = view.P[2].v;
+  const V d0 = fma(x[4], P2, fnma(x[5], P1, x[0]));
+  const V d1 = fma(x[5], P0, fnma(x[3], P2, x[1]));
+  const V d2 = fma(x[3], P1, fnma(x[4], P0, x[2]));
+  V A[2][3], e[2];
+  for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 3; ++i) A[r][i] = view.J.point[r][i].v;
+    e[r] = fma(A[r][0], d0, fma(A[r][1], d1, hn::Mul(A[r][2], d2)));
+  }
+  const LensPlaces& lens = tracks.lenses[tracks.lens[8 * batch]];
+  const double* blocks = in.x + kProductRecord * std::size_t(lens.first_block);
+  double* to = saved + kPlainFields * kLanes;
+  for (std::size_t p = 0; p < kMaxCameraParameters; ++p) {
+    const int place = lens.place[p];
+    if (place < 0) continue;
+    const int own = place - LensPlaces::kRiders;
+    const V along = own < 0 ? x[6 + place] : set(blocks[kProductRecord * (own / 9) + own % 9]);
+    for (int r = 0; r < 2; ++r, to += kLanes) {
+      e[r] = fma(view.J.parameters[r][p].v, along, e[r]);
+      store(view.J.parameters[r][p].v, to);
+    }
+  }
+  // Of the two factors of each product of rows, one takes the whole weight.
+  scale = hn::Mul(scale, scale);
+  for (int r = 0; r < 2; ++r) e[r] = hn::Mul(e[r], scale);
+  V g[3];
+  for (int i = 0; i < 3; ++i) g[i] = fma(A[0][i], e[0], hn::Mul(A[1][i], e[1]));
+  for (int i = 0; i < 3; ++i)
+    s[i] = fma(view.c[i], g[0], fma(view.c[3 + i], g[1], fma(view.c[6 + i], g[2], s[i])));
+  for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 3; ++i) store(A[r][i], saved + (3 * r + i) * kLanes);
+    store(e[r], saved + (18 + r) * kLanes);
+  }
+  store(P0, saved + 6 * kLanes), store(P1, saved + 7 * kLanes), store(P2, saved + 8 * kLanes);
+  for (int i = 0; i < 9; ++i) store(view.c[i], saved + (9 + i) * kLanes);
+}
+
+/// As second_lens_sweep; what the lens's own blocks get is added to `sums`, eight lanes for each
+/// free parameter in turn.
+HWY_INLINE void second_plain_sweep(const double* saved, const LensPlaces& lens, int lane, V scale,
+                                   const V* u, V* v, double* sums) {
+  const auto field = [&](int i) { return load(saved + i * kLanes); };
+  scale = hn::Mul(scale, scale);
+  V m[3], e[2];
+  for (int i = 0; i < 3; ++i)
+    m[i] =
+        fma(field(9 + 3 * i), u[0], fma(field(10 + 3 * i), u[1], hn::Mul(field(11 + 3 * i), u[2])));
+  for (int r = 0; r < 2; ++r) {
+    const V along =
+        fma(field(3 * r), m[0], fma(field(3 * r + 1), m[1], hn::Mul(field(3 * r + 2), m[2])));
+    e[r] = fnma(scale, along, field(18 + r));
+  }
+  for (int i = 0; i < 3; ++i) v[i] = fma(field(i), e[0], hn::Mul(field(3 + i), e[1]));
+  const V P0 = field(6), P1 = field(7), P2 = field(8);
+  v[3] = fms(P1, v[2], hn::Mul(P2, v[1]));
+  v[4] = fms(P2, v[0], hn::Mul(P0, v[2]));
+  v[5] = fms(P0, v[1], hn::Mul(P1, v[0]));
+  for (int i = 6; i < 9; ++i) v[i] = zero();
+  const double* J = saved + kPlainFields * kLanes;
+  for (std::size_t p = 0; p < kMaxCameraParameters; ++p) {
+    const int place = lens.place[p];
+    if (place < 0) continue;
+    const V along = fma(load(J), e[0], hn::Mul(load(J + kLanes), e[1]));
+    J += 2 * kLanes;
+    if (place < LensPlaces::kRiders)
+      v[6 + place] = along;
+    else
+      add_to(along, sums + 8 * p + lane);
+  }
+}
+
+/// What a shared lens gets from a group.
+class SharedLensSums {
+ public:
+  HWY_INLINE SharedLensSums(const LensTracks& tracks, double* y) : tracks_(tracks), y_(y) {}
+  /// Eight lanes for each parameter of this lens.
+  HWY_INLINE double* of(std::int32_t lens) {
+    if (lens != lens_) {
+      flush();
+      lens_ = lens;
+      std::fill_n(lanes_, 8 * kMaxCameraParameters, 0.0);
+    }
+    return lanes_;
+  }
+  HWY_INLINE void flush() const {
+    if (lens_ < 0) return;
+    const LensPlaces& lens = tracks_.lenses[static_cast<std::size_t>(lens_)];
+    double* to = y_ + kProductRecord * std::size_t(lens.first_block);
+    for (std::size_t p = 0; p < kMaxCameraParameters; ++p) {
+      const int own = lens.place[p] - LensPlaces::kRiders;
+      if (own >= 0) to[kProductRecord * (own / 9) + own % 9] += sum8(lanes_ + 8 * p);
+    }
+  }
+
+ private:
+  const LensTracks& tracks_;
+  double* y_;
+  std::int32_t lens_ = -1;
+  alignas(64) double lanes_[8 * kMaxCameraParameters];
+};
+
 inline void lens_product_group(const LensProductInput& in, std::size_t g, double* saved,
                                double* sums) {
   const Batches& batches = *in.of.batches;
@@ -139,29 +262,46 @@ inline void lens_product_group(const LensProductInput& in, std::size_t g, double
     const V X[3] = {load(at), load(at + 8), load(at + 16)};
     const V mask = lane_mask(group.lanes, lane);
     V s[3] = {zero(), zero(), zero()};
-    for (std::uint32_t o = 0; o < group.track; ++o)
-      first_lens_sweep(in, group.first_batch + o, lane, X,
-                       row_scale(in, group.first_batch + o, lane, mask),
-                       saved + part_doubles * (kParts * o + part), s);
+    for (std::uint32_t o = 0; o < group.track; ++o) {
+      const std::uint64_t b = group.first_batch + o;
+      const V scale = row_scale(in, b, lane, mask);
+      double* to = saved + part_doubles * (kParts * o + part);
+      if (is_plain(tracks, b))
+        first_plain_sweep(in, b, lane, X, scale, to, s);
+      else
+        first_lens_sweep(in, b, lane, X, scale, to, s);
+    }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
   }
+  SharedLensSums shared(tracks, sums);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     alignas(64) double rows[3][64], ninth[3][8];
+    const bool plain = is_plain(tracks, b);
+    const std::uint32_t first_lens = tracks.lens[8 * b];
+    const LensPlaces& lens = tracks.lenses[first_lens];
+    double* lens_sums =
+        plain && lens.blocks > 0 ? shared.of(static_cast<std::int32_t>(first_lens)) : nullptr;
+    const int own_blocks = plain ? 0 : blocks;
     for (int part = 0; part < kParts; ++part) {
       const int lane = part * kLanes;
       V v[27];
-      second_lens_sweep(saved + part_doubles * (kParts * o + part), blocks,
-                        row_scale(in, b, lane, lane_mask(group.lanes, lane)), u[part], v);
-      for (int k = 0; k <= blocks; ++k) {
+      const double* from = saved + part_doubles * (kParts * o + part);
+      const V scale = row_scale(in, b, lane, lane_mask(group.lanes, lane));
+      if (plain)
+        second_plain_sweep(from, lens, lane, scale, u[part], v, lens_sums);
+      else
+        second_lens_sweep(from, blocks, scale, u[part], v);
+      for (int k = 0; k <= own_blocks; ++k) {
         store_records(v + 9 * k, rows[k] + 8 * lane, 8);
         store(v[9 * k + 8], ninth[k] + lane);
       }
     }
     scatter(rows[0], ninth[0], &batches.image[8 * b], batches.uniform[b], sums);
-    for (int k = 0; k < blocks; ++k)
+    for (int k = 0; k < own_blocks; ++k)
       scatter_to_lenses(rows[k + 1], ninth[k + 1], LensBlocks(tracks, b, k), sums);
   }
+  shared.flush();
 }
 
 }  // namespace HWY_NAMESPACE
