@@ -125,13 +125,30 @@ HWY_INLINE void scatter_to_lenses(const double* rows, const double* ninth, const
   }
 }
 
-/// Whether all lanes of a batch look through one kind of lens and, where that has blocks of its
-/// own, through one lens. Then rows need no common form: the lens's free parameters stand one after
-/// another, and what a shared lens gets is summed lane by lane over a group.
+/// Whether all lanes of a batch look through one kind of lens. Then rows need no common form: the
+/// free parameters stand one after another, and what a shared lens gets is summed lane by lane over
+/// a group.
 HWY_INLINE bool is_plain(const LensTracks& tracks, std::uint64_t batch) {
-  const std::int32_t kind = tracks.uniform_kind[batch];
-  return kind >= 0 && (tracks.kinds[static_cast<std::size_t>(kind)].blocks == 0 ||
-                       tracks.uniform_lens[batch] >= 0);
+  return tracks.uniform_kind[batch] >= 0;
+}
+
+/// Where a parameter stands in the blocks of its lens, from the first one's record on.
+HWY_INLINE std::size_t block_column(int place) {
+  const auto own = static_cast<std::size_t>(place - LensPlaces::kRiders);
+  return kProductRecord * (own / 9) + own % 9;
+}
+
+/// That of each lane's lens.
+HWY_INLINE V load_parameter(const double* x, const LensTracks& tracks, std::uint64_t batch,
+                            int lane, int place) {
+  const std::uint32_t* lens = &tracks.lens[8 * batch + static_cast<std::size_t>(lane)];
+  const auto of = [&](std::uint32_t l) {
+    return x[kProductRecord * std::size_t(tracks.lenses[l].first_block) + block_column(place)];
+  };
+  if (tracks.uniform_lens[batch] >= 0) return set(of(lens[0]));
+  alignas(64) double lanes[8];
+  for (int l = 0; l < kLanes; ++l) lanes[l] = of(lens[l]);
+  return load(lanes);
 }
 
 /// A (2x3, du/dP), P, R and e of an observation, kept as this many vectors; then two for each free
@@ -157,13 +174,12 @@ HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batc
     e[r] = fma(A[r][0], d0, fma(A[r][1], d1, hn::Mul(A[r][2], d2)));
   }
   const LensPlaces& lens = tracks.lenses[tracks.lens[8 * batch]];
-  const double* blocks = in.x + kProductRecord * std::size_t(lens.first_block);
   double* to = saved + kPlainFields * kLanes;
   for (std::size_t p = 0; p < kMaxCameraParameters; ++p) {
     const int place = lens.place[p];
     if (place < 0) continue;
-    const int own = place - LensPlaces::kRiders;
-    const V along = own < 0 ? x[6 + place] : set(blocks[kProductRecord * (own / 9) + own % 9]);
+    const V along = place < LensPlaces::kRiders ? x[6 + place]
+                                                : load_parameter(in.x, tracks, batch, lane, place);
     for (int r = 0; r < 2; ++r, to += kLanes) {
       e[r] = fma(view.J.parameters[r][p].v, along, e[r]);
       store(view.J.parameters[r][p].v, to);
@@ -218,33 +234,42 @@ HWY_INLINE void second_plain_sweep(const double* saved, const LensPlaces& lens, 
   }
 }
 
-/// What a shared lens gets from a group.
-class SharedLensSums {
+/// What lenses' own blocks get from a group, eight lanes for each parameter. The sums of a lens
+/// that all lanes share run on from batch to batch.
+class LensSums {
  public:
-  HWY_INLINE SharedLensSums(const LensTracks& tracks, double* y) : tracks_(tracks), y_(y) {}
-  /// Eight lanes for each parameter of this lens.
-  HWY_INLINE double* of(std::int32_t lens) {
-    if (lens != lens_) {
+  HWY_INLINE LensSums(const LensTracks& tracks, double* y) : tracks_(tracks), y_(y) {}
+  HWY_INLINE double* of(std::uint64_t batch) {
+    const std::int32_t shared = tracks_.uniform_lens[batch];
+    if (shared < 0 || shared != shared_) {
       flush();
-      lens_ = lens;
       std::fill_n(lanes_, 8 * kMaxCameraParameters, 0.0);
+      lens_ = &tracks_.lens[8 * batch];
+      shared_ = shared;
     }
     return lanes_;
   }
   HWY_INLINE void flush() const {
-    if (lens_ < 0) return;
-    const LensPlaces& lens = tracks_.lenses[static_cast<std::size_t>(lens_)];
-    double* to = y_ + kProductRecord * std::size_t(lens.first_block);
+    if (lens_ == nullptr) return;
+    const LensPlaces& kind = tracks_.lenses[lens_[0]];
+    const auto add = [&](std::uint32_t lens, std::size_t p, double value) {
+      const auto at = kProductRecord * std::size_t(tracks_.lenses[lens].first_block);
+      y_[at + block_column(kind.place[p])] += value;
+    };
     for (std::size_t p = 0; p < kMaxCameraParameters; ++p) {
-      const int own = lens.place[p] - LensPlaces::kRiders;
-      if (own >= 0) to[kProductRecord * (own / 9) + own % 9] += sum8(lanes_ + 8 * p);
+      if (kind.place[p] < LensPlaces::kRiders) continue;
+      if (shared_ >= 0)
+        add(lens_[0], p, sum8(lanes_ + 8 * p));
+      else
+        for (std::size_t l = 0; l < 8; ++l) add(lens_[l], p, lanes_[8 * p + l]);
     }
   }
 
  private:
   const LensTracks& tracks_;
   double* y_;
-  std::int32_t lens_ = -1;
+  const std::uint32_t* lens_ = nullptr;  ///< of the lanes
+  std::int32_t shared_ = -1;
   alignas(64) double lanes_[8 * kMaxCameraParameters];
 };
 
@@ -273,15 +298,13 @@ inline void lens_product_group(const LensProductInput& in, std::size_t g, double
     }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
   }
-  SharedLensSums shared(tracks, sums);
+  LensSums of_lenses(tracks, sums);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     alignas(64) double rows[3][64], ninth[3][8];
     const bool plain = is_plain(tracks, b);
-    const std::uint32_t first_lens = tracks.lens[8 * b];
-    const LensPlaces& lens = tracks.lenses[first_lens];
-    double* lens_sums =
-        plain && lens.blocks > 0 ? shared.of(static_cast<std::int32_t>(first_lens)) : nullptr;
+    const LensPlaces& lens = tracks.lenses[tracks.lens[8 * b]];
+    double* lens_sums = plain && lens.blocks > 0 ? of_lenses.of(b) : nullptr;
     const int own_blocks = plain ? 0 : blocks;
     for (int part = 0; part < kParts; ++part) {
       const int lane = part * kLanes;
@@ -301,7 +324,7 @@ inline void lens_product_group(const LensProductInput& in, std::size_t g, double
     for (int k = 0; k < own_blocks; ++k)
       scatter_to_lenses(rows[k + 1], ninth[k + 1], LensBlocks(tracks, b, k), sums);
   }
-  shared.flush();
+  of_lenses.flush();
 }
 
 }  // namespace HWY_NAMESPACE

@@ -63,7 +63,7 @@ double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 constexpr double kPairNs = 8, kImplicitNs = 5.5, kBlockNs = 12, kPlaceNs = 200,
                  kDenseFlopsPerNs = 85;
 /// An observation's part in an implicit product through lenses of any model.
-constexpr double kLensImplicitNs = 40;
+constexpr double kLensImplicitNs = 30;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
 double iterations(const WorkCounts& c) { return c.clusters > 0 ? 15 : 25; }
