@@ -33,19 +33,21 @@ GreyPlane GreyPlane::frame(int width, int height) {
 }
 
 std::size_t GreyPlane::bytes(int width, int height) {
-  return sizeof(float) * static_cast<std::size_t>(stride_of(width)) *
-         std::size_t(height + 2 * kBorder);
+  return resident_bytes_of(sizeof(float) * static_cast<std::size_t>(stride_of(width)) *
+                           std::size_t(height + 2 * kBorder));
 }
 
 GreyPlane::GreyPlane(int width, int height, const float* pixels)
     : width_(width), height_(height), stride_(stride_of(width)) {
-  pixels_.resize(static_cast<std::size_t>(stride_) * std::size_t(height + 2 * kBorder));
+  const auto all = std::make_shared<Buffer<float>>(static_cast<std::size_t>(stride_) *
+                                                   std::size_t(height + 2 * kBorder));
   for (int y = -kBorder; y < height + kBorder; ++y) {
     const float* from = pixels + std::size_t(std::clamp(y, 0, height - 1)) * std::size_t(width);
-    float* row = pixels_.data() + (y + kBorder) * stride_;
+    float* row = all->data() + (y + kBorder) * stride_;
     for (int x = -kBorder; x < width + kRightBorder; ++x)
       row[x + kBorder] = from[std::clamp(x, 0, width - 1)];
   }
+  pixels_ = all;
 }
 
 std::vector<float> halve(int width, int height, const float* pixels) {

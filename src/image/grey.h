@@ -4,7 +4,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
+
+#include "platform/buffer.h"
 
 namespace sheaf {
 
@@ -39,11 +42,12 @@ class GreyPlane {
   const float* at(int x, int y) const { return origin() + y * stride_ + x; }
 
  private:
-  const float* origin() const { return pixels_.data() + kBorder * stride_ + kBorder; }
+  const float* origin() const { return pixels_->data() + kBorder * stride_ + kBorder; }
 
   int width_ = 0, height_ = 0;
   std::ptrdiff_t stride_ = 0;
-  std::vector<float> pixels_;
+  /// Shared by copies. On large pages: each row of a patch would be on a small page of its own.
+  std::shared_ptr<const Buffer<float>> pixels_;
 };
 
 /// Half the size: every pixel is the mean of four, so that its centre (x, y) is at

@@ -317,7 +317,7 @@ std::vector<std::uint32_t> cut_into_slices(const Chunks& c, std::uint32_t num_im
 }  // namespace
 
 Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
-                       Threads& threads) {
+                       Threads& threads, std::uint64_t most_batches) {
   Chunks out;
   const std::uint32_t groups = static_cast<std::uint32_t>(batches.groups.size());
   for (std::uint32_t g = 0; g < groups;) {
@@ -328,7 +328,7 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLi
       return batches.groups[i].first_batch + batches.groups[i].track;
     };
     do ++g;
-    while (g < groups && end_of(g) - chunk.first_batch <= Chunks::kBatchesPerChunk);
+    while (g < groups && end_of(g) - chunk.first_batch <= most_batches);
     chunk.end_group = g;
     chunk.end_batch = end_of(g - 1);
     out.most_batches = std::max(out.most_batches, chunk.end_batch - chunk.first_batch);
@@ -340,9 +340,10 @@ Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLi
   return out;
 }
 
-Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists) {
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
+                       std::uint64_t most_batches) {
   Threads alone(1);
-  return cut_into_chunks(batches, num_images, lists, alone);
+  return cut_into_chunks(batches, num_images, lists, alone, most_batches);
 }
 
 }  // namespace sheaf

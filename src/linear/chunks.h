@@ -68,7 +68,8 @@ enum class ChunkLists {
   pairs,     ///< records by image, and pairs by tile; needs longest_track <= kLongestTrack
 };
 Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
-                       Threads& threads);
-Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists);
+                       Threads& threads, std::uint64_t most_batches = Chunks::kBatchesPerChunk);
+Chunks cut_into_chunks(const Batches& batches, std::uint32_t num_images, ChunkLists lists,
+                       std::uint64_t most_batches = Chunks::kBatchesPerChunk);
 
 }  // namespace sheaf

@@ -69,43 +69,77 @@ struct PointSums {
   }
 };
 
+/// What the records of one observation per lane are made of.
+struct Eliminated {
+  V b[2][3], l00, l10, l11, h0, h1;
+
+  HWY_INLINE Eliminated(const LaneJacobian& j, const Factor& f, const V* w) {
+    for (int r = 0; r < 2; ++r) forward(f, j.point[r], b[r]);
+    const V q0 = fma(b[0][0], w[0], fma(b[0][1], w[1], fma(b[0][2], w[2], j.r[0])));
+    const V q1 = fma(b[1][0], w[0], fma(b[1][1], w[1], fma(b[1][2], w[2], j.r[1])));
+    const V one = set(1.0), tiny = set(1e-20);
+    V m00 = fnma(b[0][0], b[0][0], fnma(b[0][1], b[0][1], fnma(b[0][2], b[0][2], one)));
+    V m01 = hn::Neg(fma(b[0][0], b[1][0], fma(b[0][1], b[1][1], hn::Mul(b[0][2], b[1][2]))));
+    V m11 = fnma(b[1][0], b[1][0], fnma(b[1][1], b[1][1], fnma(b[1][2], b[1][2], one)));
+    m00 = hn::Max(m00, tiny);
+    const V i0 = inverse_sqrt(m00);
+    l00 = hn::Mul(m00, i0), l10 = hn::Mul(m01, i0);
+    m11 = hn::Max(fnma(l10, l10, m11), tiny);
+    const V i1 = inverse_sqrt(m11);
+    l11 = hn::Mul(m11, i1);
+    h0 = hn::Mul(q0, i0);
+    h1 = hn::Mul(fnma(l10, h0, q1), i1);
+  }
+  /// Column i of C and of T.
+  HWY_INLINE V c0(const LaneJacobian& j, int i) const {
+    return fma(l00, j.camera[0][i], hn::Mul(l10, j.camera[1][i]));
+  }
+  HWY_INLINE V c1(const LaneJacobian& j, int i) const { return hn::Mul(l11, j.camera[1][i]); }
+  HWY_INLINE V t(const LaneJacobian& j, int q, int i) const {
+    return fma(j.camera[0][i], b[0][q], hn::Mul(j.camera[1][i], b[1][q]));
+  }
+};
+
 /// Writes the T and C records of one observation per lane.
 HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w, double* T,
                               double* C) {
-  V b[2][3];
-  for (int r = 0; r < 2; ++r) forward(f, j.point[r], b[r]);
-  const V q0 = fma(b[0][0], w[0], fma(b[0][1], w[1], fma(b[0][2], w[2], j.r[0])));
-  const V q1 = fma(b[1][0], w[0], fma(b[1][1], w[1], fma(b[1][2], w[2], j.r[1])));
-  const V one = set(1.0), tiny = set(1e-20);
-  V m00 = fnma(b[0][0], b[0][0], fnma(b[0][1], b[0][1], fnma(b[0][2], b[0][2], one)));
-  V m01 = hn::Neg(fma(b[0][0], b[1][0], fma(b[0][1], b[1][1], hn::Mul(b[0][2], b[1][2]))));
-  V m11 = fnma(b[1][0], b[1][0], fnma(b[1][1], b[1][1], fnma(b[1][2], b[1][2], one)));
-  m00 = hn::Max(m00, tiny);
-  const V i0 = inverse_sqrt(m00);
-  const V l00 = hn::Mul(m00, i0), l10 = hn::Mul(m01, i0);
-  m11 = hn::Max(fnma(l10, l10, m11), tiny);
-  const V i1 = inverse_sqrt(m11);
-  const V l11 = hn::Mul(m11, i1);
-  const V h0 = hn::Mul(q0, i0);
-  const V h1 = hn::Mul(fnma(l10, h0, q1), i1);
-
+  const Eliminated e(j, f, w);
   V fields[8], last[8];
-  for (int i = 0; i < 8; ++i) fields[i] = fma(l00, j.camera[0][i], hn::Mul(l10, j.camera[1][i]));
+  for (int i = 0; i < 8; ++i) fields[i] = e.c0(j, i);
   store_records(fields, C, kCRecord);
-  for (int i = 0; i < 8; ++i) fields[i] = hn::Mul(l11, j.camera[1][i]);
+  for (int i = 0; i < 8; ++i) fields[i] = e.c1(j, i);
   store_records(fields, C + 8, kCRecord);
   for (int q = 0; q < 3; ++q) {
-    for (int i = 0; i < 8; ++i)
-      fields[i] = fma(j.camera[0][i], b[0][q], hn::Mul(j.camera[1][i], b[1][q]));
+    for (int i = 0; i < 8; ++i) fields[i] = e.t(j, q, i);
     store_records(fields, T + 8 * q, kTRecord);
-    last[q] = fma(j.camera[0][8], b[0][q], hn::Mul(j.camera[1][8], b[1][q]));
+    last[q] = e.t(j, q, 8);
   }
   last[3] = zero();
-  last[4] = fma(l00, j.camera[0][8], hn::Mul(l10, j.camera[1][8]));
-  last[5] = hn::Mul(l11, j.camera[1][8]);
-  last[6] = h0;
-  last[7] = h1;
+  last[4] = e.c0(j, 8);
+  last[5] = e.c1(j, 8);
+  last[6] = e.h0;
+  last[7] = e.h1;
   store_records(last, T + 24, kTRecord);
+}
+
+/// As write_records, of blocks that are poses alone: six columns, and h in the seventh of C, so
+/// that C^T C has the right-hand side in it. The last eight of T are not written.
+HWY_INLINE void write_pose_records(const LaneJacobian& j, const Factor& f, const V* w, double* T,
+                                   double* C) {
+  const Eliminated e(j, f, w);
+  V fields[8];
+  fields[7] = zero();
+  for (int i = 0; i < 6; ++i) fields[i] = e.c0(j, i);
+  fields[6] = e.h0;
+  store_records(fields, C, kCRecord);
+  for (int i = 0; i < 6; ++i) fields[i] = e.c1(j, i);
+  fields[6] = e.h1;
+  store_records(fields, C + 8, kCRecord);
+  fields[6] = zero();
+  for (int q = 0; q < 3; ++q) {
+    for (int i = 0; i < 6; ++i) fields[i] = e.t(j, q, i);
+    store_records(fields, T + 8 * q, kTRecord);
+  }
 }
 
 /// Marquardt's damping of the points: D = lambda diag(V), clamped.
@@ -186,8 +220,8 @@ struct GroupPart {
 };
 
 /// Factors the points of a part and writes their records; the rows of observation o stand at
-/// rows + stride o.
-template <bool Charted>
+/// rows + stride o. Poses: write_pose_records.
+template <bool Charted, bool Poses = false>
 HWY_INLINE void finish_group(const EliminateInput& in, const PointSums& p,
                              [[maybe_unused]] const LaneChart& chart, const GroupPart& of,
                              const double* rows, std::size_t stride, double* T, double* C,
@@ -209,9 +243,14 @@ HWY_INLINE void finish_group(const EliminateInput& in, const PointSums& p,
                      y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
   for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
 
-  for (std::uint32_t o = 0; o < of.track; ++o)
-    write_records(restore(rows + stride * o), f, w, T + kTRecord * (8 * o + lane),
-                  C + kCRecord * (8 * o + lane));
+  for (std::uint32_t o = 0; o < of.track; ++o) {
+    const std::size_t record = 8 * o + static_cast<std::size_t>(lane);
+    const LaneJacobian j = restore(rows + stride * o);
+    if constexpr (Poses)
+      write_pose_records(j, f, w, T + kTRecord * record, C + kCRecord * record);
+    else
+      write_records(j, f, w, T + kTRecord * record, C + kCRecord * record);
+  }
 }
 
 /// The rows of a loss: sqrt(rho') times those of the residual.

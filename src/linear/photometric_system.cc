@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "linear/lens_kernels.h"
 #include "linear/plan.h"
 #include "linear/slices.h"
 #include "residual/exact_patches.h"
@@ -72,6 +73,7 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
       rules_(rules),
       kernels_(kernels),
       row_kernels_(row_kernels(kernels.name)),
+      pose_pairs_(lens_kernels(kernels.name).pose_pairs),
       patch_kernels_(photometric_kernels(kernels.name)),
       threads_(threads),
       anchor_(std::move(anchor)),
@@ -80,7 +82,8 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
       mixed_(mix_rows(scene, blocks_, batches_, rules.exact_rows, anchor_, state.points.size() / 3,
                       row_kernels_.lanes)),
       chunks_(cut_into_chunks(rows(), blocks_.count(),
-                              rules.points_held ? ChunkLists::diagonal : ChunkLists::pairs)),
+                              rules.points_held ? ChunkLists::diagonal : ChunkLists::pairs,
+                              kBatchesPerChunk)),
       image_chunks_(
           only_tiles(blocks_.are_pairs() ? blocks_.image_tiles(chunks_.tiles) : chunks_.tiles)),
       columns_(number_columns(scene.num_images(), rules)),
@@ -103,7 +106,10 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
       tile_of_[tile.row * images + tile.column] = static_cast<std::int64_t>(t);
     }
   }
-  leaving_.allocate(16 * batches_.num_batches());
+  if (!rules.leaving_is_free) {
+    leaving_.allocate(16 * batches_.num_batches());
+    leaving_costs_.allocate(16 * batches_.num_batches());
+  }
   scratch_.resize(static_cast<std::size_t>(threads.count()));
   const SolverKind kind =
       columns_.count <= kMostDenseColumns ? SolverKind::dense : SolverKind::sparse;
@@ -116,15 +122,16 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
 void PhotometricSystem::allocate(Half& half) const {
   half.views.allocate(kViewRecord * blocks_.count());
   half.points.allocate(kPointGroup * rows().groups.size());
-  half.rows.allocate(kRowBatch * rows().num_batches());
-  if (mixed_) {
+  if (!mixed_) {
+    half.factors.allocate(patch_factors(rules_.brightness) * batches_.num_batches());
+  } else {
+    half.rows.allocate(kRowBatch * rows().num_batches());
     const std::size_t pairs = rules_.exact_rows && scene_.warped ? kExactPairs : 1;
     half.patch_points.allocate(kPointGroup * batches_.groups.size());
     half.patch_rows.allocate(kRowBatch * pairs * batches_.num_batches());
   }
   half.brightness_sums.allocate(rules_.brightness ? kBrightnessBatch * batches_.num_batches() : 0);
   half.seen.allocate(16 * batches_.num_batches());
-  half.costs.allocate(16 * batches_.num_batches());
 }
 
 void PhotometricSystem::fill_state(const PatchState& state) {
@@ -149,37 +156,46 @@ void PhotometricSystem::fill_state(const PatchState& state) {
   blocks_.write_views(held_.poses, held_.brightness, held_.views.data());
 }
 
-PhotometricSystem::Totals PhotometricSystem::collapse(Half& half) {
+PhotometricSystem::Totals PhotometricSystem::collapse(Half& half, double* costs) {
   if (mixed_) mixed_->spread_points(batches_, half.points.data(), half.patch_points.data());
-  Totals totals = collapse_patches(half);
+  Totals totals = collapse_patches(half, costs);
   if (mixed_) gather_rows(half, totals);
   totals.cost += prior_cost(half);
   return totals;
 }
 
+PhotometricInput PhotometricSystem::patches_at(const Half& half) const {
+  return {&batches_,
+          scene_.planes.data(),
+          blocks_.targets().data(),
+          half.views.data(),
+          mixed_ ? half.patch_points.data() : half.points.data(),
+          scene_.has_rays() ? rays_.data() : nullptr,
+          scene_.references.data(),
+          &scene_.grid,
+          leaving_.data(),
+          scene_.camera,
+          scene_.taps,
+          loss_,
+          rules_.loss_per_patch,
+          rules_.brightness,
+          scene_.warped};
+}
+
+/// The held state's; patches: those at it.
+KeptRows PhotometricSystem::kept(const PhotometricInput& patches) const {
+  if (mixed_) return {held_.rows.data(), nullptr, nullptr};
+  return {nullptr, &patches, held_.factors.data()};
+}
+
 /// Chunks write what is theirs; their costs are added in order.
-PhotometricSystem::Totals PhotometricSystem::collapse_patches(Half& half) {
+PhotometricSystem::Totals PhotometricSystem::collapse_patches(Half& half, double* costs) {
   const bool exact = rules_.exact_rows && scene_.warped;
   const Chunks& chunks = patch_chunks();
-  const PhotometricInput in{&batches_,
-                            scene_.planes.data(),
-                            blocks_.targets().data(),
-                            half.views.data(),
-                            mixed_ ? half.patch_points.data() : half.points.data(),
-                            scene_.has_rays() ? rays_.data() : nullptr,
-                            scene_.references.data(),
-                            &scene_.grid,
-                            leaving_.data(),
-                            scene_.camera,
-                            scene_.taps,
-                            loss_,
-                            rules_.loss_per_patch,
-                            rules_.brightness,
-                            scene_.warped};
+  const PhotometricInput in = patches_at(half);
   std::vector<PhotometricOutput> outputs(
-      chunks.chunks.size(),
-      {mixed_ ? half.patch_rows.data() : half.rows.data(), half.brightness_sums.data(),
-       half.seen.data(), half.costs.data(), 0, 0, 0});
+      chunks.chunks.size(), {mixed_ ? half.patch_rows.data() : nullptr, half.factors.data(),
+                             half.brightness_sums.data(), half.seen.data(), costs, 0, 0, 0});
   threads_.for_each(outputs.size(), [&](std::size_t c) {
     const Chunk& chunk = chunks.chunks[c];
     if (exact)
@@ -215,11 +231,11 @@ void PhotometricSystem::hold(const ScaledLoss& loss) {
   if (collapsed_ && loss.kind == loss_.kind && loss.scale_px == loss_.scale_px) return;
   loss_ = loss;
   leaving_.fill(0);
-  totals_ = collapse(held_);
+  totals_ = collapse(held_, leaving_costs_.data());
   collapsed_ = true;
   if (rules_.leaving_is_free) return;
   set_leaving();
-  if (totals_.left > 0) totals_ = collapse(held_);
+  if (totals_.left > 0) totals_ = collapse(held_, nullptr);
 }
 
 /// A patch that leaves costs as much as it does now, and no less than the mean does.
@@ -233,13 +249,14 @@ void PhotometricSystem::set_leaving() {
   };
   for_each_patch([&](std::uint64_t at) {
     if (std::isnan(held_.seen[at])) return;
-    sum[0] += held_.costs[at], sum[1] += held_.costs[at + 8];
+    sum[0] += leaving_costs_[at], sum[1] += leaving_costs_[at + 8];
     ++count;
   });
   if (count == 0) return;
   for_each_patch([&](std::uint64_t at) {
     for (int k = 0; k < 2; ++k)
-      leaving_[at + 8 * k] = std::max(held_.costs[at + 8 * k], sum[k] / static_cast<double>(count));
+      leaving_[at + 8 * k] =
+          std::max(leaving_costs_[at + 8 * k], sum[k] / static_cast<double>(count));
   });
 }
 
@@ -289,7 +306,8 @@ void PhotometricSystem::eliminate(double damping, std::vector<EliminateOutput>& 
   const std::size_t slices = outputs.size();
   const std::size_t tile_doubles = tiles_.size() / slices;
   const std::size_t diagonal_doubles = diagonal_.size() / slices;
-  const StoredRowsInput in{&rows(), held_.rows.data(), damping, rules_.points_held};
+  const PhotometricInput patches = patches_at(held_);
+  const StoredRowsInput in{&rows(), kept(patches), damping, rules_.points_held, !rules_.brightness};
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(scratch_doubles(rows(), chunks_));
@@ -302,9 +320,14 @@ void PhotometricSystem::eliminate(double damping, std::vector<EliminateOutput>& 
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c) {
       const Chunk& chunk = chunks_.chunks[c];
       row_kernels_.eliminate(in, chunk, records, outputs[s]);
-      kernels_.diagonal(rows(), chunks_, chunk, records, diagonal);
-      kernels_.pairs(chunks_, chunk, records, tiles);
-      if (rules_.brightness && !mixed_) add_brightness(chunk, diagonal);
+      if (rules_.brightness) {
+        kernels_.diagonal(rows(), chunks_, chunk, records, diagonal);
+        kernels_.pairs(chunks_, chunk, records, tiles);
+        if (!mixed_) add_brightness(chunk, diagonal);
+      } else {
+        row_kernels_.pose_diagonal(chunks_, chunk, records, diagonal);
+        pose_pairs_(chunks_, chunk, records, tiles);
+      }
     }
   });
   add_slices(tiles_, slices, threads_);
@@ -368,7 +391,8 @@ double PhotometricSystem::step_cameras() {
 Trial PhotometricSystem::trial() {
   Trial out;
   out.step_norm = step_cameras();
-  const RowTrialInput in{&rows(), held_.rows.data(), steps_.data(), held_.points.data(),
+  const PhotometricInput patches = patches_at(held_);
+  const RowTrialInput in{&rows(), kept(patches), steps_.data(), held_.points.data(),
                          factors_.data()};
   std::vector<TrialOutput> outputs(chunks_.chunks.size(),
                                    TrialOutput{tried_.points.data(), 0, 0, 0, 0});
@@ -380,7 +404,7 @@ Trial PhotometricSystem::trial() {
     decrease += o.damping_term;
     step2 = std::max(step2, o.step2_max);
   }
-  tried_totals_ = collapse(tried_);
+  tried_totals_ = collapse(tried_, nullptr);
   out.cost = tried_totals_.cost / 2;
   out.plain_cost = tried_totals_.square_sum / 2;
   out.predicted_decrease = decrease / 2;
@@ -393,19 +417,21 @@ Trial PhotometricSystem::trial() {
 double PhotometricSystem::median_motion() const {
   constexpr std::uint64_t kSamples = 256;
   const std::uint64_t batches = batches_.num_batches();
-  std::vector<double> moves;
+  std::vector<double> squares;
+  squares.reserve(8 * kSamples);
   for (std::uint64_t k = 0; k < std::min(kSamples, batches); ++k) {
     const std::uint64_t b = k * batches / std::min(kSamples, batches);
     for (std::uint64_t at = 16 * b; at < 16 * b + 8; ++at) {
-      const double move =
-          std::hypot(tried_.seen[at] - held_.seen[at], tried_.seen[at + 8] - held_.seen[at + 8]);
-      if (!std::isnan(move)) moves.push_back(move);
+      const double dx = tried_.seen[at] - held_.seen[at];
+      const double dy = tried_.seen[at + 8] - held_.seen[at + 8];
+      const double square = dx * dx + dy * dy;
+      if (!std::isnan(square)) squares.push_back(square);
     }
   }
-  if (moves.empty()) return 0;
-  const auto middle = moves.begin() + static_cast<std::ptrdiff_t>(moves.size() / 2);
-  std::nth_element(moves.begin(), middle, moves.end());
-  return *middle;
+  if (squares.empty()) return 0;
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle);
 }
 
 void PhotometricSystem::accept() {

@@ -39,6 +39,10 @@ class PhotometricSystem : public System {
   /// Dense up to where its factor costs about as much as the patches' pixels; then by blocks.
   static constexpr std::int32_t kMostDenseColumns = 1200;
 
+  /// Fewer than of reprojections, so that records are near: a point that all images see has its own
+  /// read for every pair of them.
+  static constexpr std::uint64_t kBatchesPerChunk = 32;
+
   /// Throws std::bad_alloc. The sights are the patches that count, in any order; those that are not
   /// in their image when a loss is first used count as having left. Measured positions have to be
   /// those of points in front of their cameras.
@@ -61,7 +65,9 @@ class PhotometricSystem : public System {
   struct Half {  ///< all that belongs to one state: the held one or the one tried
     std::vector<RigidMotion<double>> poses;
     std::vector<Brightness> brightness;
-    Buffer<double> views, points, rows, brightness_sums, seen, costs;
+    Buffer<double> views, points, brightness_sums, seen;
+    Buffer<double> factors;  ///< of the patches; or, where some points' rows are others:
+    Buffer<double> rows;     ///< as elimination takes them
     Buffer<double> patch_points, patch_rows;  ///< in the patches' arrangement where that differs
   };
   struct Totals {
@@ -71,8 +77,11 @@ class PhotometricSystem : public System {
 
   void fill_state(const PatchState& state);
   void allocate(Half& half) const;
-  Totals collapse(Half& half);
-  Totals collapse_patches(Half& half);
+  /// costs: of the patches (PhotometricOutput), or nullptr.
+  Totals collapse(Half& half, double* costs);
+  Totals collapse_patches(Half& half, double* costs);
+  PhotometricInput patches_at(const Half& half) const;
+  KeptRows kept(const PhotometricInput& patches) const;
   void gather_rows(Half& half, Totals& totals) const;
   void hold(const ScaledLoss& loss);
   void set_leaving();
@@ -95,6 +104,7 @@ class PhotometricSystem : public System {
   const PhotometricRules rules_;
   const Kernels& kernels_;
   const RowKernels& row_kernels_;
+  void (*const pose_pairs_)(const Chunks&, const Chunk&, const Records&, double* tiles);
   const PhotometricKernels& patch_kernels_;
   Threads& threads_;
   const Anchor anchor_;
@@ -109,7 +119,7 @@ class PhotometricSystem : public System {
 
   Half held_, tried_;
   Buffer<double> rays_;
-  Buffer<double> leaving_;
+  Buffer<double> leaving_, leaving_costs_;  ///< empty where leaving is free
   Buffer<double> factors_, tiles_, diagonal_;
   Buffer<double> image_tiles_, image_diagonal_;  ///< folded; empty where blocks are images
   std::vector<std::int64_t> tile_of_;            ///< of two images

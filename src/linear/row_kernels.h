@@ -5,16 +5,26 @@
 #include <cstddef>
 
 #include "linear/kernels.h"
+#include "residual/photometric.h"
 #include "residual/row_store.h"
 
 namespace sheaf {
 
 /// Rows that were computed once and are kept: what observations of any kind hand to elimination.
+/// Either they are stored; or they are those of patches, one observation each, and made again from
+/// the patches' factors: reading a fifth of the bytes takes longer than the arithmetic.
+struct KeptRows {
+  const double* stored = nullptr;             ///< kRowBatch per batch; or nullptr, and:
+  const PhotometricInput* patches = nullptr;  ///< at the state that they were read at
+  const double* factors = nullptr;            ///< patch_factors(patches->brightness) per batch
+};
+
 struct StoredRowsInput {
   const Batches* batches;
-  const double* rows;  ///< kRowBatch per batch
-  double damping;      ///< as in EliminateInput
+  KeptRows rows;
+  double damping;  ///< as in EliminateInput
   bool points_held;
+  bool poses;  ///< blocks are poses alone: records are for pose_diagonal and pose pairs
 };
 
 /// A camera block's step as back-substitution reads it: nine columns, seven unused.
@@ -22,13 +32,13 @@ constexpr std::size_t kStepRecord = 16;
 
 struct RowTrialInput {
   const Batches* batches;
-  const double* rows;
+  KeptRows rows;
   const double* steps;    ///< kStepRecord per block
   const double* points;   ///< held
   const double* factors;  ///< as elimination left them
 };
 
-/// One instruction set's kernels over one chunk of stored rows. Elimination shares every line with
+/// One instruction set's kernels over one chunk of kept rows. Elimination shares every line with
 /// that of reprojection from where the rows are known.
 struct RowKernels {
   const char* name;
@@ -36,6 +46,8 @@ struct RowKernels {
   /// As Kernels::linearize from there on: factors the points and writes the records; adds to
   /// out.point_decrease and out.gradient_max2.
   void (*eliminate)(const StoredRowsInput&, const Chunk&, const Records&, EliminateOutput& out);
+  /// As Kernels::diagonal, of blocks that are poses alone.
+  void (*pose_diagonal)(const Chunks&, const Chunk&, const Records&, double* diagonal);
   /// Back-substitutes the chunk's points into out.points; adds to out.damping_term, out.step2_max.
   void (*back_substitute)(const RowTrialInput&, const Chunk&, TrialOutput& out);
 };

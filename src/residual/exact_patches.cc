@@ -149,7 +149,7 @@ PatchCost collapse_lane(const PhotometricInput& in, std::size_t g, std::uint64_t
         view[3 * i] * d[0] + view[3 * i + 1] * d[8] + view[3 * i + 2] * d[16] + s * view[9 + i];
   const auto u = patch.project({patch.P[0], patch.P[1], patch.P[2]});
   patch.middle[0] = u[0], patch.middle[1] = u[1];
-  double *seen = out.seen + 16 * b + lane, *costs = out.costs + 16 * b + lane;
+  double* seen = out.seen + 16 * b + lane;
   PatchCost cost;
   if (patch.fits()) {
     cost = list_pixels(patch, rows);
@@ -159,12 +159,17 @@ PatchCost collapse_lane(const PhotometricInput& in, std::size_t g, std::uint64_t
     if (in.brightness) write_brightness(rows, out.brightness + kBrightnessBatch * b + lane);
     seen[0] = u[0], seen[8] = u[1];
   } else {
-    const double* leaving = in.leaving + 16 * b + lane;
-    cost = {leaving[0], leaving[8]};
+    if (in.leaving != nullptr) {
+      const double* leaving = in.leaving + 16 * b + lane;
+      cost = {leaving[0], leaving[8]};
+    }
     seen[0] = seen[8] = std::numeric_limits<double>::quiet_NaN();
     ++out.left;
   }
-  costs[0] = cost.rho, costs[8] = cost.square;
+  if (out.costs != nullptr) {
+    double* costs = out.costs + 16 * b + lane;
+    costs[0] = cost.rho, costs[8] = cost.square;
+  }
   return cost;
 }
 
@@ -178,7 +183,7 @@ void collapse_exactly(const PhotometricInput& in, int lanes, std::uint32_t first
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
       std::fill_n(out.rows + kRowBatch * kExactPairs * b, kRowBatch * kExactPairs, 0.0);
       std::fill_n(out.seen + 16 * b, 16, std::numeric_limits<double>::quiet_NaN());
-      std::fill_n(out.costs + 16 * b, 16, 0.0);
+      if (out.costs != nullptr) std::fill_n(out.costs + 16 * b, 16, 0.0);
       if (in.brightness) std::fill_n(out.brightness + kBrightnessBatch * b, kBrightnessBatch, 0.0);
       for (int lane = 0; lane < static_cast<int>(group.lanes); ++lane) {
         const PatchCost cost = collapse_lane(in, g, b, lane, lanes, out, rows);

@@ -10,6 +10,7 @@
 #endif
 
 #include "residual/loss_lanes-inl.h"
+#include "residual/patch_rows-inl.h"
 #include "residual/photometric.h"
 #include "residual/rows-inl.h"
 
@@ -43,39 +44,19 @@ constexpr int kPatchSums = kBrightness ? k1r + 1 : kGxg;
 
 using GreyTag = hn::Rebind<float, D>;
 using Greys = hn::Vec<GreyTag>;
+/// Lanes of doubles that are whole numbers, as indices of greys.
+using IndexTag = hn::Rebind<std::int32_t, D>;
 
 HWY_INLINE V load_greys(const float* p) { return hn::PromoteTo(D(), hn::LoadU(GreyTag(), p)); }
-
-/// Where the lanes' points are: P in the camera's frame, and the patch's middle in the image.
-struct Place {
-  V P[3], iz, x, y;
-};
 
 /// The points of a part's lanes, and the camera blocks that see them.
 struct PatchLanes {
   int used;  ///< lanes that have a point
+  V mask;    ///< 1 where they have one
   const std::uint32_t *point, *block;
+  bool uniform;  ///< one block for all
   V alpha, beta;
 };
-
-HWY_INLINE Place place_points(const Pinhole& camera, const V* c, const V* d, V s) {
-  Place at;
-  for (int r = 0; r < 3; ++r)
-    at.P[r] =
-        fma(c[3 * r], d[0], fma(c[3 * r + 1], d[1], fma(c[3 * r + 2], d[2], hn::Mul(s, c[9 + r]))));
-  at.iz = hn::Div(set(1.0), at.P[2]);
-  at.x = fma(set(camera.fx), hn::Mul(at.P[0], at.iz), set(camera.cx));
-  at.y = fma(set(camera.fy), hn::Mul(at.P[1], at.iz), set(camera.cy));
-  return at;
-}
-
-HWY_INLINE void zero_rows(hn::Mask<D> keep, LaneJacobian& j) {
-  for (int r = 0; r < 2; ++r) {
-    j.r[r] = hn::IfThenElseZero(keep, j.r[r]);
-    for (V& x : j.camera[r]) x = hn::IfThenElseZero(keep, x);
-    for (V& x : j.point[r]) x = hn::IfThenElseZero(keep, x);
-  }
-}
 
 /// Weights of four taps, each lane with a fraction of its own; tap_weights is the scalar twin.
 struct SpreadTaps {
@@ -124,26 +105,30 @@ struct LanePixels {
   V reference, grey, gx, gy;
 };
 
-/// One pixel for each lane; `mask` is 1 where there is one and 0 elsewhere.
-template <bool kBrightness, bool kMasked>
+/// One pixel for each lane; `mask` is 1 where there is one and 0 elsewhere. kWeigh: look.weigh may
+/// be; without it sums[kCost], which is sums[kSquare], is not summed.
+template <bool kBrightness, bool kMasked, bool kWeigh = true>
 HWY_INLINE void add_pixels(const LanePixels& at, const Look& look, [[maybe_unused]] V mask,
                            V* sums) {
   const V g = at.reference, gx = at.gx, gy = at.gy;
-  V r = hn::Sub(at.grey, fma(look.alpha, g, look.beta)), w = set(1.0);
-  if constexpr (kMasked) r = hn::Mul(mask, r), w = mask;
+  V r = hn::Sub(at.grey, fma(look.alpha, g, look.beta)), wx = gx, wy = gy;
+  if constexpr (kMasked) r = hn::Mul(mask, r), wx = hn::Mul(mask, gx), wy = hn::Mul(mask, gy);
   const V square = hn::Mul(r, r);
-  V rho = square;
-  if (look.weigh) {
-    const Rho of = rho_lanes(look.loss, square);
-    w = hn::Mul(w, of.weight), rho = of.value;
+  V w = kMasked ? mask : set(1.0);
+  if constexpr (kWeigh) {
+    V rho = square;
+    if (look.weigh) {
+      const Rho of = rho_lanes(look.loss, square);
+      w = hn::Mul(w, of.weight), rho = of.value;
+      wx = hn::Mul(w, gx), wy = hn::Mul(w, gy);
+    }
+    sums[kCost] = hn::Add(rho, sums[kCost]);
   }
-  const V wx = hn::Mul(w, gx), wy = hn::Mul(w, gy);
   sums[kGxx] = fma(wx, gx, sums[kGxx]);
   sums[kGxy] = fma(wx, gy, sums[kGxy]);
   sums[kGyy] = fma(wy, gy, sums[kGyy]);
   sums[kGxr] = fma(wx, r, sums[kGxr]);
   sums[kGyr] = fma(wy, r, sums[kGyr]);
-  sums[kCost] = hn::Add(rho, sums[kCost]);
   sums[kSquare] = hn::Add(square, sums[kSquare]);
   if constexpr (kBrightness) {
     const V wg = hn::Mul(w, g);

@@ -107,13 +107,16 @@ PatchGrid make_grid(const Pattern& pattern) {
       }
   grid.mask.assign(grid.dx.size(), 0);
   grid.cell_at.assign(static_cast<std::size_t>(grid.width * grid.rows), -1);
+  grid.spot.assign(grid.dx.size(), static_cast<std::uint32_t>(grid.area()));
   for (std::size_t k = 0; k < pattern.size(); ++k)
     for (std::uint32_t cell = 0; cell < grid.cells(); ++cell)
       if (grid.dx[cell] == pattern.dx[k] && grid.dy[cell] == pattern.dy[k]) {
         grid.mask[cell] = 1;
         grid.place.push_back(cell);
         const int row = pattern.dy[k] - grid.top, column = pattern.dx[k] - grid.left;
-        grid.cell_at[static_cast<std::size_t>(grid.width * row + column)] = static_cast<int>(cell);
+        const auto spot = static_cast<std::size_t>(grid.width * row + column);
+        grid.cell_at[spot] = static_cast<int>(cell);
+        grid.spot[cell] = static_cast<std::uint32_t>(spot);
       }
   return grid;
 }

@@ -27,8 +27,13 @@ struct PatchGrid {
   std::vector<float> dx, dy;         ///< of every cell of `mask`
   std::vector<std::uint32_t> place;  ///< of the pattern's pixel k in `mask`
   std::vector<int> cell_at;  ///< width x rows: where a pixel of the rectangle is in `mask`, or -1
+  /// Of every cell of `mask`: where it is in the rectangle, row by row; area() where it has no
+  /// pixel.
+  std::vector<std::uint32_t> spot;
 
   std::size_t cells() const { return mask.size(); }
+  std::size_t area() const { return cell_at.size(); }
+  bool whole() const { return place.size() == area(); }  ///< the pattern is the rectangle
   int right() const { return left + width - 1; }
   int bottom() const { return top + rows - 1; }
 };
@@ -107,7 +112,8 @@ struct PhotometricInput {
   const double* rays;                ///< 24 per group: d of the lanes; nullptr: world points
   const float* references;           ///< grid->cells() per point, in the order of the grid
   const PatchGrid* grid;
-  const double* leaving;  ///< 16 per batch: cost of a patch that left, then its sum of squares
+  const double* leaving;  ///< 16 per batch: cost of a patch that left, then its sum of squares;
+                          ///< nullptr: nothing
   Pinhole camera;
   Taps taps;
   ScaledLoss loss;
@@ -120,13 +126,21 @@ struct PhotometricInput {
 /// fields a batch: (alpha, alpha), (alpha, beta), (beta, beta), then J^T r of both.
 constexpr std::size_t kBrightnessBatch = 5 * 8;
 
+/// Doubles of a batch's factors, 8 lanes each: r11, r12, r22, h1 and h2 (R and h of the patch's two
+/// rows); with brightness columns the rows' two entries by alpha and two by beta. With the state
+/// that the patch was read at they are its rows, in a fifth of the room.
+constexpr std::size_t patch_factors(bool brightness) { return (brightness ? 9 : 5) * 8; }
+
+/// What is nullptr is not written.
 struct PhotometricOutput {
-  double* rows;           ///< kRowBatch per batch
-  double* brightness;     ///< kBrightnessBatch per batch; not written without brightness columns
-  double* seen;           ///< 16 per batch: x of the patch's middle in the image, then y; NaN: left
-  double* costs;          ///< 16 per batch: rho of the patch, then its sum of squares
-  double cost = 0;        ///< sum of rho over patches, 2 x the cost
-  double square_sum = 0;  ///< sum of squared residuals
+  double* rows;        ///< kRowBatch per batch
+  double* factors;     ///< patch_factors(brightness) per batch
+  double* brightness;  ///< kBrightnessBatch per batch; not written without brightness columns
+  double* seen;        ///< 16 per batch: x of the patch's middle in the image, then y; NaN: left.
+                       ///< Always written
+  double* costs;       ///< 16 per batch: rho of the patch, then its sum of squares
+  double cost = 0;     ///< sum of rho over patches, 2 x the cost
+  double square_sum = 0;   ///< sum of squared residuals
   std::uint64_t left = 0;  ///< patches outside
 };
 

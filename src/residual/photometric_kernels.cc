@@ -14,6 +14,7 @@
 #include <hwy/highway.h>
 
 #include "residual/loss_lanes-inl.h"
+#include "residual/patch_rows-inl.h"
 #include "residual/patch_sums-inl.h"
 #include "residual/rows-inl.h"
 #include "residual/translated_patches-inl.h"
@@ -28,12 +29,6 @@ static_assert(kRowBatch == kJacobianFields * kLanes * kParts);
 /// Squared slopes of a patch, summed, below which there is no texture: where an image is saturated
 /// they are some 1e-28, and points that see nothing else would step by noise over noise.
 constexpr double kNoTexture = 1e-12;
-
-/// The first two rows of the Cholesky factor of the Gram matrix of (gx, gy, -g, -1), and as much
-/// of the residual: G = R^T R, R h = G^T r. A pivot that is rounding leaves a row of zeros.
-struct Whitened {
-  V r11, r12, r22, alpha[2], beta[2], h[2];
-};
 
 template <bool kBrightness>
 HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
@@ -66,100 +61,138 @@ HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
   return w;
 }
 
-/// The rows' Jacobians. With A = R du/dP: by rho s A, by phi P x A (row by row), by the world point
-/// A R, by the inverse depth A t.
-template <bool kRays>
-HWY_INLINE LaneJacobian rows_of(const Whitened& w, const Pinhole& camera, const V* c,
-                                const Place& at, V s) {
-  const V fx = hn::Mul(set(camera.fx), at.iz), fy = hn::Mul(set(camera.fy), at.iz);
-  const V px = hn::Mul(at.P[0], at.iz), py = hn::Mul(at.P[1], at.iz);
-  const V a[2][2] = {{hn::Mul(w.r11, fx), hn::Mul(w.r12, fy)}, {zero(), hn::Mul(w.r22, fy)}};
-  LaneJacobian j;
-  for (int r = 0; r < 2; ++r) {
-    const V a0 = a[r][0], a1 = a[r][1], a2 = hn::Neg(fma(a0, px, hn::Mul(a1, py)));
-    j.r[r] = w.h[r];
-    V* to = j.camera[r];
-    to[0] = hn::Mul(s, a0), to[1] = hn::Mul(s, a1), to[2] = hn::Mul(s, a2);
-    to[3] = fms(a2, at.P[1], hn::Mul(a1, at.P[2]));
-    to[4] = fms(a0, at.P[2], hn::Mul(a2, at.P[0]));
-    to[5] = fms(a1, at.P[0], hn::Mul(a0, at.P[1]));
-    to[6] = w.alpha[r], to[7] = w.beta[r], to[8] = zero();
-    if constexpr (kRays) {
-      j.point[r][0] = fma(a0, c[9], fma(a1, c[10], hn::Mul(a2, c[11])));
-      j.point[r][1] = j.point[r][2] = zero();
-    } else {
-      for (int i = 0; i < 3; ++i)
-        j.point[r][i] = fma(a0, c[i], fma(a1, c[3 + i], hn::Mul(a2, c[6 + i])));
-    }
-  }
-  return j;
-}
-
 struct CollapseSums {
   V cost[kParts], square[kParts];
   std::uint64_t left = 0;
 };
 
+/// The parts of batches in order: group by group, part by part.
+struct Walk {
+  const Batches& batches;
+  std::uint32_t group, end;
+  int part = 0;
+  std::uint64_t batch = 0;
+
+  Walk(const Batches& of, std::uint32_t first_group, std::uint32_t end_group)
+      : batches(of), group(first_group), end(end_group) {
+    if (!done()) batch = here().first_batch;
+  }
+  bool done() const { return group == end; }
+  const Batches::Group& here() const { return batches.groups[group]; }
+  bool begins_points() const { return batch == here().first_batch; }
+  int lane() const { return part * kLanes; }
+  void advance() {
+    if (++batch < here().first_batch + here().track) return;
+    if (++part == kParts) part = 0, ++group;
+    if (!done()) batch = here().first_batch;
+  }
+};
+
+/// What is known of a part of a batch before its pixels are read.
+struct Aim {
+  Place at;
+  V alpha, beta;
+  TranslatedLanes pixels;  ///< of patches that are not warped
+};
+
+HWY_INLINE PatchLanes lanes_at(const Walk& walk, V alpha, V beta) {
+  const Batches& batches = walk.batches;
+  const int lane = walk.lane();
+  return {std::clamp(static_cast<int>(walk.here().lanes) - lane, 0, kLanes),
+          lane_mask(walk.here().lanes, lane),
+          &batches.lane_point[8 * std::size_t(walk.group) + lane],
+          &batches.image[8 * walk.batch + lane],
+          batches.uniform[walk.batch] >= 0,
+          alpha,
+          beta};
+}
+
+template <bool kRays>
+HWY_INLINE void aim(const PhotometricInput& in, const Walk& walk, const PhotometricOutput& out,
+                    Aim& to) {
+  V c[16];
+  load_cameras<2>(in.views, &walk.batches.image[8 * walk.batch + walk.lane()],
+                  walk.batches.uniform[walk.batch], c);
+  const LanePoints X = load_points<kRays>(in, walk.group, walk.lane());
+  to.at = place_points(in.camera, c, X.d, X.s);
+  to.alpha = c[12], to.beta = c[13];
+  double* seen = out.seen + 16 * walk.batch + walk.lane();
+  if (kRays && in.warped)
+    store(to.at.x, seen), store(to.at.y, seen + 8);
+  else
+    to.pixels.find(in, lanes_at(walk, to.alpha, to.beta), to.at, seen);
+}
+
 /// The patches of one batch's part.
 template <bool kBrightness, bool kRays>
-HWY_INLINE void collapse_part(const PhotometricInput& in, const Batches::Group& group,
-                              std::size_t g, std::uint64_t b, int part, double* scratch,
-                              const PhotometricOutput& out, CollapseSums& sums) {
-  const Batches& batches = *in.batches;
-  const int lane = part * kLanes;
-  const std::uint32_t* block = &batches.image[8 * b + lane];
-  V c[16], d[3];
-  load_cameras<2>(in.views, block, batches.uniform[b], c);
-  const double* X = in.points + 24 * g + lane;
-  const double* from = kRays ? in.rays + 24 * g + lane : X;
-  for (int i = 0; i < 3; ++i) d[i] = load(from + 8 * i);
-  const V s = kRays ? load(X) : set(1.0);
-  const Place at = place_points(in.camera, c, d, s);
-  double* seen = out.seen + 16 * b + lane;
-  store(at.x, seen), store(at.y, seen + 8);
-  alignas(64) double inside[8];
-  const PatchLanes lanes{std::clamp(static_cast<int>(group.lanes) - lane, 0, kLanes),
-                         &batches.lane_point[8 * g + lane], block, c[12], c[13]};
+HWY_INLINE void collapse_part(const PhotometricInput& in, const Walk& walk, Aim& aim,
+                              double* scratch, const PhotometricOutput& out, CollapseSums& sums) {
+  const std::uint64_t b = walk.batch;
+  const int lane = walk.lane(), part = walk.part;
   V of[kPatchSums<kBrightness>];
-  sums.left += kRays && in.warped
-                   ? sum_warped_lanes<kBrightness>(in, lanes, at, seen, inside, scratch, of)
-                   : sum_translated_lanes<kBrightness>(in, lanes, at, scratch, seen, inside, of);
+  double* inside = aim.pixels.inside;
+  if (kRays && in.warped) {
+    sums.left += sum_warped_lanes<kBrightness>(in, lanes_at(walk, aim.alpha, aim.beta), aim.at,
+                                               out.seen + 16 * b + lane, inside, scratch, of);
+  } else {
+    sums.left += aim.pixels.left;
+    sum_translated_lanes<kBrightness>(in, aim.pixels, aim.at, aim.alpha, aim.beta, scratch, of);
+  }
   V cost = of[kCost];
   if (in.loss_per_patch) {
     const Rho rho = rho_lanes(LossLanes(in.loss), of[kSquare]);
     cost = rho.value;
     for (int k = kGxx; k < kPatchSums<kBrightness>; ++k) of[k] = hn::Mul(of[k], rho.weight);
   }
-  const V fits = load(inside), mask = lane_mask(group.lanes, lane);
-  const V away = hn::Mul(hn::Sub(set(1.0), fits), mask);
-  const double* leaving = in.leaving + 16 * b + lane;
-  cost = fma(cost, fits, hn::Mul(load(leaving), away));
-  const V square = fma(of[kSquare], fits, hn::Mul(load(leaving + 8), away));
-  double* costs = out.costs + 16 * b + lane;
-  store(cost, costs), store(square, costs + 8);
+  V square = of[kSquare];
+  const auto fits = hn::Gt(load(inside), zero());
+  const bool all_fit = hn::AllTrue(D(), fits);
+  if (!all_fit && in.leaving != nullptr) {
+    const V away = hn::IfThenZeroElse(fits, lane_mask(walk.here().lanes, lane));
+    const double* leaving = in.leaving + 16 * b + lane;
+    cost = hn::Add(hn::IfThenElseZero(fits, cost), hn::Mul(load(leaving), away));
+    square = hn::Add(square, hn::Mul(load(leaving + 8), away));
+  }
+  if (out.costs != nullptr) {
+    double* costs = out.costs + 16 * b + lane;
+    store(cost, costs), store(square, costs + 8);
+  }
   sums.cost[part] = hn::Add(sums.cost[part], cost);
   sums.square[part] = hn::Add(sums.square[part], square);
   const Whitened w = whiten<kBrightness>(of, out.brightness + kBrightnessBatch * b + lane);
-  LaneJacobian j = rows_of<kRays>(w, in.camera, c, at, s);
-  if (!hn::AllTrue(D(), hn::Gt(fits, zero()))) zero_rows(hn::Gt(fits, zero()), j);
+  if (out.factors != nullptr)
+    save_factors<kBrightness>(w, out.factors + patch_factors(kBrightness) * b + lane);
+  if (out.rows == nullptr) return;
+  V c[16];
+  load_cameras<2>(in.views, &walk.batches.image[8 * b + lane], walk.batches.uniform[b], c);
+  const LanePoints X = load_points<kRays>(in, walk.group, lane);
+  LaneJacobian j = rows_of<kRays>(w, in.camera, c, aim.at, X.s);
+  if (!all_fit) zero_rows(fits, j);
   save(j, out.rows + kRowBatch * b + kJacobianFields * kLanes * part);
 }
 
+/// Where the next patches' pixels are is known, and they are asked for, before those of the ones at
+/// hand are read.
 template <bool kBrightness, bool kRays>
 void collapse_groups(const PhotometricInput& in, std::uint32_t first, std::uint32_t end,
                      PhotometricOutput& out) {
   Buffer<double> scratch;  // sums of warped patches; references of others
   const bool warped = kRays && in.warped;
-  scratch.allocate(warped ? kSumScratch : kLanes * in.grid->cells());
+  scratch.allocate(warped ? kSumScratch : kLanes * (in.grid->area() + 1));
   CollapseSums sums;
   for (int p = 0; p < kParts; ++p) sums.cost[p] = sums.square[p] = zero();
-  for (std::uint32_t g = first; g < end; ++g) {
-    const Batches::Group group = in.batches->groups[g];
-    for (int p = 0; p < kParts; ++p) {
-      if (!warped) spread_references(in, group, g, p, scratch.data());
-      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-        collapse_part<kBrightness, kRays>(in, group, g, b, p, scratch.data(), out, sums);
-    }
+  Aim aims[2];
+  const std::size_t window = warped ? 0 : TranslatedLanes::window_floats(*in.grid);
+  Buffer<float> windows(2 * window);
+  for (std::size_t k = 0; k < 2; ++k) aims[k].pixels.windows = windows.data() + k * window;
+  Walk walk(*in.batches, first, end), next = walk;
+  if (!next.done()) aim<kRays>(in, next, out, aims[0]);
+  for (int turn = 0; !walk.done(); walk.advance(), turn ^= 1) {
+    next.advance();
+    if (!next.done()) aim<kRays>(in, next, out, aims[turn ^ 1]);
+    if (!warped && walk.begins_points())
+      spread_references(in, walk.here(), walk.group, walk.part, scratch.data());
+    collapse_part<kBrightness, kRays>(in, walk, aims[turn], scratch.data(), out, sums);
   }
   alignas(64) double lanes[8];
   for (int p = 0; p < kParts; ++p) store(sums.cost[p], lanes + p * kLanes);

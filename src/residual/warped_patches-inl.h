@@ -40,9 +40,6 @@ HWY_INLINE V add_lanes(const double* of) {
                  hn::Add(hn::Add(f[4], f[5]), hn::Add(f[6], f[7])));
 }
 
-/// Lanes of doubles that are whole numbers, as indices of greys.
-using IndexTag = hn::Rebind<std::int32_t, D>;
-
 /// The plane at (x, y) of each lane; positions outside are moved to the border.
 HWY_INLINE void read_spread(const GreyPlane& plane, Taps taps, V x, V y, LanePixels& at) {
   const V left = set(-2.0), right = set(plane.width() + 1.0), bottom = set(plane.height() + 1.0);

@@ -42,6 +42,7 @@ PatchStatistics::PatchStatistics(const PatchScene& scene, const std::vector<Sigh
 void PatchStatistics::measure_before(const PatchState& state) {
   std::vector<double> patch;
   first_.clear();
+  first_.reserve(scene_.grid.place.size() * seen_.size());
   for (const Sight& sight : seen_) {
     patch_residuals(scene_, state, sight, patch);
     first_.insert(first_.end(), patch.begin(), patch.end());
@@ -52,6 +53,7 @@ void PatchStatistics::measure_before(const PatchState& state) {
 void PatchStatistics::measure_after(const PatchState& state) {
   const std::size_t pixels = scene_.grid.place.size();
   std::vector<double> now, patch;
+  now.reserve(first_.size());
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     if (!patch_residuals(scene_, state, seen_[i], patch)) {
       ++left_;

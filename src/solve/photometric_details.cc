@@ -90,6 +90,8 @@ class Examination {
       PointSigma sigma(scene_, 1);
       std::vector<double> residuals, variances;
       const auto last = begin_of(end);
+      const auto most = static_cast<std::size_t>(last - begin_of(first)) * pattern_.size();
+      part.sizes.reserve(most), part.noise.reserve(most);
       for (auto sight = begin_of(first); sight != last; ++sight) {
         if (!counts(*sight) || !patch_residuals(scene_, state_, *sight, residuals)) continue;
         sigma.variances(state_, *sight, variances);

@@ -12,6 +12,7 @@
 #include "linear/forecast.h"
 #include "linear/photometric_system.h"
 #include "platform/pages.h"
+#include "solve/patch_anchor.h"
 #include "solve/patch_level.h"
 
 namespace sheaf {
@@ -111,34 +112,44 @@ Counts count(const PhotometricProblem& problem, const PhotometricOptions& option
   w.images = rays ? sample.blocks.size() : images;
   w.columns = images * ((options.fix_poses ? 0u : 6u) + (options.affine_brightness ? 2u : 0u));
   w.tiles = std::min<std::uint64_t>(w.pairs, sample.tiles.size());
-  w.pair_runs = std::min(w.pairs, w.tiles * (1 + w.batches / Chunks::kBatchesPerChunk));
+  w.pair_runs = std::min(w.pairs, w.tiles * (1 + w.batches / PhotometricSystem::kBatchesPerChunk));
   w.sparse_doubles = w.columns * (w.columns + 1) / 2;
   c.image_tiles = rays ? sample.image_tiles.size() : 0;
   return c;
 }
 
-/// The scene as one level reads it.
-std::uint64_t scene_bytes(const PhotometricProblem& problem, const PhotometricOptions& options,
-                          const Pattern& pattern) {
+/// What one level reads: images, and what is kept of the points.
+struct SceneBytes {
+  std::uint64_t planes = 0, points = 0;
+  std::uint64_t all() const { return planes + points; }
+};
+
+SceneBytes scene_bytes(const PhotometricProblem& problem, const PhotometricOptions& options,
+                       const Pattern& pattern) {
   const std::uint64_t points = problem.num_points();
-  std::uint64_t bytes = points * 4 * make_grid(pattern).cells();
+  SceneBytes bytes;
+  bytes.points = points * 4 * make_grid(pattern).cells();
+  if (uses_rays(problem, options)) bytes.points += 28 * points;
   for (const GreyImage& image : problem.images)
-    bytes += GreyPlane::bytes(image.width, image.height);
-  return bytes + (uses_rays(problem, options) ? 28 * points : 0);
+    bytes.planes += GreyPlane::bytes(image.width, image.height);
+  return bytes;
 }
 
-std::uint64_t system_bytes(const Counts& c, const PhotometricOptions& options, int threads) {
+/// stored: some points' rows are not those of one patch for each observation.
+std::uint64_t system_bytes(const Counts& c, const PhotometricOptions& options, bool stored,
+                           int threads) {
   const bool dense = c.work.columns <= PhotometricSystem::kMostDenseColumns;
   std::uint64_t bytes =
       forecast_bytes(c.work, {dense ? SolverKind::dense : SolverKind::sparse, ""}, threads);
   const auto add = [&](std::uint64_t doubles, std::uint64_t copies = 1) {
     bytes += copies * resident_bytes_of(8 * doubles);
   };
-  add(kRowBatch * c.work.batches, 2);
+  add((stored ? kRowBatch : patch_factors(options.affine_brightness)) * c.work.batches, 2);
   if (options.affine_brightness) add(kBrightnessBatch * c.work.batches, 2);
-  add(16 * c.work.batches, 2 * 2 + 1);  // where patches are, and costs, twice; leaving
-  add(kPointGroup * c.work.groups);     // rays
-  add(16 * c.work.batches);             // what batches hold
+  add(16 * c.work.batches, 2);                                        // where patches are
+  if (options.leaving != Leaving::free) add(16 * c.work.batches, 2);  // what leaving costs
+  add(kPointGroup * c.work.groups);                                   // rays
+  add(16 * c.work.batches);                                           // what batches hold
   add(4 * c.work.batches);
   add(kTileDoubles * c.image_tiles);
   return bytes + 24 * c.sights;  // the list that these are arranged from
@@ -150,20 +161,25 @@ std::uint64_t forecast_photometric(const PhotometricProblem& problem,
                                    const PhotometricOptions& options, const Pattern& pattern,
                                    int threads) {
   const Counts c = count(problem, options, pattern);
-  const std::uint64_t scene = scene_bytes(problem, options, pattern);
+  const SceneBytes scene = scene_bytes(problem, options, pattern);
+  const bool stored =
+      options.rows == PatchRows::exact || !measurements_of(problem, options).empty();
   const std::uint64_t pixels = pattern.size() * c.sights, residuals = 8 * pixels;
   const std::uint64_t list = 8 * c.sights;
-  // The finest level twice, as it is refined and as it is judged, and a coarser one beside it.
-  const std::uint64_t scenes = 2 * scene + (options.levels > 1 ? scene / 2 : 0);
-  std::uint64_t system = system_bytes(c, options, threads);
+  // The finest level as it is refined and as it is judged, of the same images, and a coarser one.
+  const std::uint64_t scenes =
+      scene.all() + scene.points + (options.levels > 1 ? scene.all() / 2 : 0);
+  std::uint64_t system = system_bytes(c, options, stored, threads);
   if (options.loss.kind != LossKind::none && options.loss.scale_px == kAutomaticScale) {
     // With poses and points held, beside a list of all residuals that doubles as it grows.
     Counts held = c;
     held.work.pairs = held.work.tiles = held.work.pair_runs = 0;
-    system = std::max(system, system_bytes(held, options, threads) + 8 * std::bit_ceil(pixels));
+    system =
+        std::max(system, system_bytes(held, options, stored, threads) + 8 * std::bit_ceil(pixels));
   }
   const std::uint64_t refining = scenes + residuals + 8 * c.checked + 3 * list + system;
-  const std::uint64_t looking = scene + 3 * residuals + 5 * list;
+  // The heap keeps the room of one list while another is made.
+  const std::uint64_t looking = scene.all() + 4 * residuals + 5 * list;
   return std::max(refining, looking);
 }
 

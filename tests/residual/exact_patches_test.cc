@@ -40,7 +40,7 @@ Exact collapse(const Patches& p, const ScaledLoss& loss, bool per_patch, int lan
   out.rows.resize(kRowBatch * kExactPairs * n);
   out.brightness.resize(kBrightnessBatch * n);
   out.seen.resize(16 * n), out.costs.resize(16 * n);
-  out.totals = {out.rows.data(), out.brightness.data(), out.seen.data(), out.costs.data()};
+  out.totals = {out.rows.data(), nullptr, out.brightness.data(), out.seen.data(), out.costs.data()};
   const PhotometricInput in{&p.batches,
                             p.scene.planes.data(),
                             p.targets.data(),

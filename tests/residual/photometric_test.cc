@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -52,7 +53,7 @@ Collapsed collapse(const Patches& p, const char* simd, const ScaledLoss& loss, b
                             true,
                             p.scene.warped};
   Collapsed out;
-  out.totals = {rows.data(), brightness.data(), seen.data(), costs.data()};
+  out.totals = {rows.data(), nullptr, brightness.data(), seen.data(), costs.data()};
   photometric_kernels(simd).collapse(in, 0, static_cast<std::uint32_t>(p.batches.groups.size()),
                                      out.totals);
   out.rows.assign(rows.begin(), rows.end());
@@ -113,6 +114,35 @@ TEST(PhotometricKernels, CostsAreThoseOfPlainCode) {
               EXPECT_EQ(got.totals.left, 0u);
             }
       }
+}
+
+// Lanes then read through copies, whose rows are as far apart in all of them.
+TEST(PhotometricKernels, ImagesMayBeOfDifferentSizes) {
+  for (Interpolation interpolation : {Interpolation::bicubic, Interpolation::bilinear}) {
+    Patches p(false, interpolation);
+    std::erase_if(p.sights, [](const Sight& s) { return (s.point + s.image) % 4 == 0; });
+    p.points.clear();
+    p.arrange_all();
+    for (int i = 0; i < 2; ++i) {
+      const GreyPlane& plane = p.scene.planes[static_cast<std::size_t>(i)];
+      const int width = plane.width() + 20 + 30 * i, height = plane.height() + i;
+      std::vector<float> pixels;
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+          pixels.push_back(
+              *plane.at(std::min(x, plane.width() - 1), std::min(y, plane.height() - 1)));
+      p.scene.planes[static_cast<std::size_t>(i)] = GreyPlane(width, height, pixels.data());
+    }
+    EXPECT_NE(p.scene.planes[0].stride(), p.scene.planes[1].stride());
+    EXPECT_GT(std::count(p.batches.uniform.begin(), p.batches.uniform.end(), -1), 0);
+    const ScaledLoss loss{LossKind::huber, 3};
+    const double expected = plain_cost(p.scene, p.state, p.sights, loss, true);
+    for (const std::string& simd : instruction_sets()) {
+      const Collapsed got = collapse(p, simd.c_str(), loss, true);
+      EXPECT_NEAR(got.totals.cost, expected, 1e-11 * expected) << simd;
+      EXPECT_EQ(got.totals.left, 0u);
+    }
+  }
 }
 
 TEST(PhotometricKernels, InstructionSetsAgree) {
