@@ -9,13 +9,14 @@
 A solver is NAME:CONFIG; NAME is the program `peer-NAME` (or peer_NAME.py) in one of the --peers
 folders or in bench/peers. Each is a program of its own that reads the file by itself, starts its
 clock after reading, and writes the state it ends with, whose cost is evaluated here again.
-Runs are interleaved (A B C, B C A, ...) in fresh processes. f* is the best cost found by anyone.
+Runs are interleaved, each turn in another order, in fresh processes. f* is the best cost found by anyone.
 """
 import argparse
 import json
 import math
 import os
 import platform
+import random
 import re
 import resource
 import signal
@@ -146,13 +147,21 @@ def run_undisturbed(*arguments, retries):
     return best
 
 
+def in_turn(solvers, turn):
+    """The first turn in the order given, the others shuffled: what a run finds of memory and caches
+    is what the one before left, and that must not be the same solver's every time."""
+    order = list(solvers)
+    if turn > 0:
+        random.Random(turn).shuffle(order)
+    return order
+
+
 def compare(problem, solvers, threads, options):
     """All runs of one problem at one thread count, interleaved, and their summary."""
     runs = []
     with tempfile.TemporaryDirectory() as folder:
         for turn in range(options.runs):
-            for i in range(len(solvers)):
-                name, config, program = solvers[(i + turn) % len(solvers)]
+            for name, config, program in in_turn(solvers, turn):
                 if time.time() > options.deadline:
                     runs.append({"name": name, "config": config, "threads": threads,
                                  "failed": "not run: the time for all runs was over"})
