@@ -7,6 +7,8 @@
 // doubles nothing and costs code size. The slowest is plain scalar code, for any machine.
 #if defined(__x86_64__) || defined(_M_X64)
 #define HWY_BASELINE_TARGETS HWY_SCALAR
+// Else GCC from 12.3 on and clang would have EMU128 for a baseline, which is not among these.
+#define HWY_BROKEN_EMU128 1
 #if defined(__SANITIZE_ADDRESS__)
 // SSE4 runs the lines that AVX2 runs; without it this slow build is done a quarter sooner.
 #define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_AVX2 | HWY_AVX3))
