@@ -9,8 +9,8 @@
 namespace sheaf {
 namespace {
 
-/// Shorter runs show no eigenvector well enough, and leave little to gain.
-constexpr std::size_t kFewestIterations = 8;
+/// Shorter runs show no eigenvector well enough.
+constexpr std::size_t kFewestIterations = 4;
 /// Modes that cost iterations: the preconditioner brings most eigenvalues near 1.
 constexpr double kSmall = 0.5;
 /// Of |S y - theta H^-1 y|^2 against theta: how well a mode must be known.
