@@ -161,12 +161,13 @@ bool LensChunks::possible(const Batches& batches, const LensTracks& tracks) {
   return most <= Chunks::kLongestTrack;
 }
 
-LensChunks cut_lens_chunks(const Batches& batches, const LensTracks& tracks, bool pairs,
+LensChunks cut_lens_chunks(const Batches& batches, const LensTracks& tracks, LensLists lists,
                            Threads& threads) {
   LensChunks out;
+  const bool pairs = lists == LensLists::pairs;
   out.chunks = cut_into_chunks(batches, static_cast<std::uint32_t>(tracks.image_lens.size()),
                                pairs ? ChunkLists::pairs : ChunkLists::diagonal, threads);
-  add_own_tiles(tracks, out);
+  if (lists != LensLists::diagonal) add_own_tiles(tracks, out);
   if (pairs && tracks.most_blocks > 0) {
     list_slot_pairs(batches, tracks, out, threads);
   } else {

@@ -20,8 +20,11 @@ struct LensChunks {
   /// Local record numbers have 16 bits: whether they suffice for the longest track.
   static bool possible(const Batches& batches, const LensTracks& tracks);
 };
-/// pairs: whether to list them; else there are no tiles of pairs.
-LensChunks cut_lens_chunks(const Batches& batches, const LensTracks& tracks, bool pairs,
+/// Which tiles a solver needs: none, those of a lens with itself and its own images (all there are
+/// where points are held), or those of all pairs.
+enum class LensLists { diagonal, own_lens, pairs };
+
+LensChunks cut_lens_chunks(const Batches& batches, const LensTracks& tracks, LensLists lists,
                            Threads& threads);
 
 /// Nine columns for each block: first the images', then the lenses', which so come to be the border

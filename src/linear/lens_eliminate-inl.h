@@ -12,6 +12,7 @@
 #endif
 
 #include "linear/eliminate-inl.h"
+#include "linear/lens_blocks-inl.h"
 #include "linear/lens_rows-inl.h"
 #include "linear/products-inl.h"
 
@@ -85,12 +86,14 @@ struct Whitened {
   }
 };
 
-/// The lens records of one observation per lane; block: of its lens.
+/// The lens records of one observation per lane; block: of its lens, of which no lens has more than
+/// `width` columns.
 HWY_INLINE void write_lens_records(const double* lens, const Whitened& m, SlotSums& slots,
                                    std::int32_t uniform, const std::uint16_t* rows, int block,
-                                   double* to, std::size_t stride) {
+                                   int width, double* to, std::size_t stride) {
   V C[2][9], G[2][9];
-  for (int i = 0; i < 9; ++i) {
+  for (int i = width; i < 9; ++i) C[0][i] = C[1][i] = G[0][i] = G[1][i] = zero();
+  for (int i = 0; i < width; ++i) {
     const V j0 = load(lens + kLanes * lens_field(block, 0, i));
     const V j1 = load(lens + kLanes * lens_field(block, 1, i));
     V t[3];
@@ -106,6 +109,7 @@ HWY_INLINE void write_lens_records(const double* lens, const Whitened& m, SlotSu
     store_records(C[r], to + 8 * r, stride);
     store_records(G[r], to + 16 + 8 * r, stride);
   }
+  if (width < 9) return;  // not read either
   const V ninths[8] = {C[0][8], C[1][8], G[0][8], G[1][8], zero(), zero(), zero(), zero()};
   store_records(ninths, to + 32, stride);
 }
@@ -130,52 +134,67 @@ struct PartOfGroup {
   double* slot_T;        ///< of its first slot
 };
 
-HWY_INLINE void write_group_records(const LensEliminateInput& in, const PartOfGroup& to,
-                                    const Factor& f, const V* w, const double* rows,
-                                    SlotSums& slots) {
+/// T_l of a part's slots; and of `sums`, where they are wanted, what the rows are to them.
+HWY_INLINE void sum_slots(const LensEliminateInput& in, const PartOfGroup& to, const Factor& f,
+                          const V* w, const double* rows, SlotSums& slots, const BlockSums& sums) {
   const LensTracks& tracks = *in.of.tracks;
   const Batches::Group& group = in.of.batches->groups[to.group];
-  const int lane = to.part * kLanes, blocks = tracks.most_blocks;
+  const int lane = to.part * kLanes;
   const std::size_t stride = row_fields(tracks) * kLanes;
-  const auto slots_of = [&](std::uint32_t o, std::int32_t& uniform) {
-    uniform = tracks.uniform_slot[group.first_batch + o];
-    return &tracks.slot[8 * (group.first_batch + o) + lane];
-  };
-  for (std::uint32_t o = 0; blocks > 0 && o < group.track; ++o) {
+  for (std::uint32_t o = 0; o < group.track; ++o) {
+    const std::uint64_t batch = group.first_batch + o;
     const double *row = rows + stride * o, *lens = row + kJacobianFields * kLanes;
-    V b[2][3];
+    V b[2][3], e[2];
     for (int r = 0; r < 2; ++r) {
       const V point[3] = {load(row + kLanes * (20 + 3 * r)), load(row + kLanes * (21 + 3 * r)),
                           load(row + kLanes * (22 + 3 * r))};
       forward(f, point, b[r]);
+      e[r] = load(row + kLanes * r);
+      for (int q = 0; q < 3; ++q) e[r] = fma(b[r][q], w[q], e[r]);
     }
-    std::int32_t uniform;
-    const std::uint16_t* at = slots_of(o, uniform);
-    for (int j = 0; j < blocks; ++j)
-      for (int i = 0; i < 9; ++i) {
+    const std::int32_t uniform = tracks.uniform_slot[batch];
+    const std::uint16_t* at = &tracks.slot[8 * batch + static_cast<std::size_t>(lane)];
+    for (int j = 0; j < tracks.most_blocks; ++j) {
+      if (sums) sums.add(batch, lane, j, lens, e);
+      for (int i = 0; i < tracks.most_width[std::size_t(j)]; ++i) {
         const V j0 = load(lens + kLanes * lens_field(j, 0, i));
         const V j1 = load(lens + kLanes * lens_field(j, 1, i));
         V t[3];
         for (int q = 0; q < 3; ++q) t[q] = fma(j0, b[0][q], hn::Mul(j1, b[1][q]));
         slots.add(uniform, at, j, i, t);
       }
+    }
   }
+}
+
+HWY_INLINE void write_group_records(const LensEliminateInput& in, const PartOfGroup& to,
+                                    const Factor& f, const V* w, const double* rows,
+                                    SlotSums& slots, const BlockSums& sums) {
+  const LensTracks& tracks = *in.of.tracks;
+  const Batches::Group& group = in.of.batches->groups[to.group];
+  const int lane = to.part * kLanes, blocks = tracks.most_blocks;
+  const std::size_t stride = row_fields(tracks) * kLanes;
+  if (blocks > 0) sum_slots(in, to, f, w, rows, slots, sums);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const double* row = rows + stride * o;
     const LaneJacobian j = restore(row);
     const std::size_t record = 8 * std::size_t(o) + static_cast<std::size_t>(lane);
     write_records(j, f, w, to.T + kTRecord * record, to.C + kCRecord * record);
-    if (blocks == 0) continue;
+    if (blocks == 0 || sums) continue;
     const Whitened m(j, f);
-    std::int32_t uniform;
-    const std::uint16_t* at = slots_of(o, uniform);
+    const std::int32_t uniform = tracks.uniform_slot[group.first_batch + o];
+    const std::uint16_t* at = &tracks.slot[8 * (group.first_batch + o) + std::size_t(lane)];
     const std::size_t each = kLensRecord * static_cast<std::size_t>(blocks);
     for (int b = 0; b < blocks; ++b)
       write_lens_records(row + kJacobianFields * kLanes, m, slots, uniform, at, b,
+                         tracks.most_width[std::size_t(b)],
                          to.lens + each * record + kLensRecord * static_cast<std::size_t>(b), each);
   }
   for (std::uint32_t s = 0; s < tracks.slots_of(to.group); ++s)
-    write_slot_record(slots.row(s), to.slot_T + kTRecord * (8 * s + lane));
+    if (sums)
+      sums.take(tracks.first_slot[to.group] + s, lane, slots.row(s));
+    else
+      write_slot_record(slots.row(s), to.slot_T + kTRecord * (8 * s + lane));
 }
 
 template <bool Robust>
@@ -233,7 +252,8 @@ HWY_INLINE void eliminate_lens_part(const LensEliminateInput& in, const PartOfGr
                      w[0],  w[1],  w[2],  damped.D[0], damped.D[1], damped.D[2]};
   for (int i = 0; i < 12; ++i) store(all[i], out.factors + kFactorGroup * to.group + lane + 8 * i);
   SlotSums slots(records.slots, tracks.slots_of(to.group));
-  write_group_records(in, to, f, w, records.image.jacobians, slots);
+  write_group_records(in, to, f, w, records.image.jacobians, slots,
+                      BlockSums(tracks, records.blocks));
 }
 
 template <bool Robust>
@@ -243,6 +263,7 @@ inline void eliminate_lens_chunk(const LensEliminateInput& in, const Chunk& chun
   EliminateSums sums;
   for (int p = 0; p < kParts; ++p)
     sums.square[p] = sums.loss[p] = sums.decrease[p] = sums.gradient2[p] = zero();
+  if (const BlockSums blocks(tracks, records.blocks); blocks) blocks.clear();
   const std::size_t observations = 8 * (chunk.end_batch - chunk.first_batch);
   const std::size_t each = kLensRecord * static_cast<std::size_t>(tracks.most_blocks);
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {

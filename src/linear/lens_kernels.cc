@@ -49,8 +49,11 @@ void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) 
 }
 
 void multiply_by_lenses(const LensProductInput& in, const Chunk& chunk, double* saved, double* y) {
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+  const std::size_t groups = in.of.batches->groups.size();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    prefetch_groups(in.of.at.points, in.factors, 6, g + 1, std::min<std::size_t>(g + 2, groups));
     lens_product_group(in, g, saved, y);
+  }
 }
 
 void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
@@ -92,17 +95,24 @@ std::uint64_t most_slots(const LensTracks& tracks, const Chunks& chunks) {
 
 }  // namespace
 
-LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks) {
+LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
+                         const LensTiles& tiles) {
+  // More blocks than these are not cleared and flushed for every chunk.
+  constexpr std::size_t kFewBlocks = 8;
+  const std::size_t all_blocks = lens_blocks(tracks);
+  const bool sums = tiles.of_image.empty() && all_blocks > 0 && all_blocks <= kFewBlocks;
   const std::size_t observations = 8 * chunks.most_batches;
-  const auto blocks = static_cast<std::size_t>(tracks.most_blocks);
+  const auto row_blocks = static_cast<std::size_t>(tracks.most_blocks);
+  const std::size_t recorded = sums ? 0 : row_blocks;
   std::size_t rows = 0;
   for (std::size_t g = 0; g < batches.groups.size(); ++g)
     rows = std::max<std::size_t>(rows, tracks.slots_of(g));
-  C = kTRecord * (observations + 8 * most_slots(tracks, chunks));
+  C = kTRecord * (observations + (sums ? 0 : 8 * most_slots(tracks, chunks)));
   lens = C + kCRecord * observations;
-  slots = lens + kLensRecord * blocks * observations;
-  jacobians = slots + 27 * 8 * (rows + 1);
-  doubles = jacobians + 8 * (26 + 18 * blocks) * batches.longest_track;
+  slots = lens + kLensRecord * recorded * observations;
+  blocks = slots + 27 * 8 * (rows + 1);
+  jacobians = blocks + (sums ? kBlockSums * (all_blocks + 1) : 0);
+  doubles = jacobians + 8 * (26 + 18 * row_blocks) * batches.longest_track;
 }
 
 std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tracks) {

@@ -36,7 +36,8 @@ struct LensEliminateInput {
   ScaledLoss loss{};
 };
 
-/// Where the sums of products of lenses' blocks go: the numbers of their tiles.
+/// Where the sums of products of lenses' blocks go: the numbers of their tiles. Empty where nothing
+/// but diagonal blocks is wanted.
 struct LensTiles {
   std::vector<std::uint32_t> of_image;  ///< two per image: lens's block 0 or 1, and the image
   std::vector<std::uint32_t> of_lens;   ///< one per lens: its blocks 1 and 0
@@ -48,21 +49,28 @@ struct LensTiles {
 /// lens and itself or the image need: with J the lens's columns,
 ///   C = Lm^T J,   G = Lm^-1 (J - B T_l^T),   so that a^T G = J_a^T J - T_a T_l^T for C_a = Lm^T
 ///   J_a:
-/// C's two rows (8 each), G's two rows, then their ninths: C (2), G (2), 4 unused.
+/// C's two rows (8 each), G's two rows, then, where a lens has nine columns in the block, their
+/// ninths: C (2), G (2), 4 unused. Where only diagonal blocks of a few lenses are wanted, `blocks`
+/// holds these as they are summed, and there are no records of lenses and slots.
 struct LensRecords {
   Records image;
   double* lens;
-  double* slots;  ///< of one group's sums T_l
+  double* slots;   ///< of one group's sums T_l
+  double* blocks;  ///< kBlockSums per block of a lens and one more; nullptr: not so summed
 };
-constexpr std::size_t kLensRecord = 40;
+constexpr std::size_t kLensRecord = 40, kBlockSums = 504;
 
 /// The records laid out for any of these chunks in one thread's scratch.
 struct LensScratch {
-  std::size_t C, lens, slots, jacobians, doubles;  ///< from the start, T's; in all
+  std::size_t C, lens, slots, blocks, jacobians, doubles;  ///< from the start, T's; in all
 
-  LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks);
+  LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
+              const LensTiles& tiles);
   LensRecords in(double* scratch) const {
-    return {{scratch, scratch + C, scratch + jacobians}, scratch + lens, scratch + slots};
+    return {{scratch, scratch + C, scratch + jacobians},
+            scratch + lens,
+            scratch + slots,
+            jacobians > blocks ? scratch + blocks : nullptr};
   }
 };
 /// Rows of slots of a chunk before the group's.

@@ -10,6 +10,7 @@
 #define SHEAF_LINEAR_LENS_PRODUCTS_INL_H_
 #endif
 
+#include "linear/lens_blocks-inl.h"
 #include "linear/lens_kernels.h"
 #include "linear/products-inl.h"
 
@@ -28,14 +29,16 @@ struct ImageRows {
     return {from.C + kCRecord * record, from.T + kTRecord * record + 28};
   }
 };
-/// C of a lens's block, or G.
+constexpr double kNoNinths[2] = {0, 0};
+/// C of a lens's block, or G. Blocks of less than nine columns have no ninths in their records.
 template <bool kG>
 struct LensRows {
   const double* lens;
   std::size_t stride;
+  bool nine_wide;
   HWY_INLINE TwoRows at(std::uint16_t record) const {
     const double* of = lens + stride * record;
-    return {of + (kG ? 16 : 0), of + (kG ? 34 : 32)};
+    return {of + (kG ? 16 : 0), nine_wide ? of + (kG ? 34 : 32) : kNoNinths};
   }
 };
 
@@ -150,6 +153,7 @@ inline void pose_pair_products(const Chunks& chunks, const Chunk& chunk, const R
 inline void lens_products(const LensTracks& tracks, const LensTiles& tiles_of, const Chunks& chunks,
                           const Chunk& chunk, const LensRecords& from, double* diagonal,
                           double* tiles) {
+  if (const BlockSums blocks(tracks, from.blocks); blocks) return blocks.flush(diagonal);
   const std::size_t stride = kLensRecord * static_cast<std::size_t>(tracks.most_blocks);
   const ImageRows image_rows{from.image};
   RunSums sums;
@@ -159,16 +163,19 @@ inline void lens_products(const LensTracks& tracks, const LensTiles& tiles_of, c
     const std::uint32_t lens = tracks.image_lens[run.image];
     const LensPlaces& places = tracks.lenses[lens];
     for (std::uint32_t j = 0; j < places.blocks; ++j) {
-      const LensRows<false> C{from.lens + kLensRecord * j, stride};
-      const LensRows<true> G{from.lens + kLensRecord * j, stride};
-      multiply_run(records, run.count, G, image_rows, sums);
-      take_from_tile(sums, tiles + kTileDoubles * tiles_of.of_image[2 * run.image + j]);
+      const bool nine_wide = tracks.most_width[j] == 9;
+      const LensRows<false> C{from.lens + kLensRecord * j, stride, nine_wide};
+      const LensRows<true> G{from.lens + kLensRecord * j, stride, nine_wide};
+      if (!tiles_of.of_image.empty()) {
+        multiply_run(records, run.count, G, image_rows, sums);
+        take_from_tile(sums, tiles + kTileDoubles * tiles_of.of_image[2 * run.image + j]);
+      }
       double* block = diagonal + kDiagonalDoubles * (places.first_block + j);
       multiply_run(records, run.count, C, G, sums);
       add_to_block(sums, block);
       add_right_side(records, run.count, C, from.image, block);
-      if (j == 0) continue;
-      const LensRows<true> G0{from.lens, stride};
+      if (j == 0 || tiles_of.of_lens.empty()) continue;
+      const LensRows<true> G0{from.lens, stride, tracks.most_width[0] == 9};
       multiply_run(records, run.count, C, G0, sums);
       take_from_tile(sums, tiles + kTileDoubles * tiles_of.of_lens[lens]);
     }

@@ -47,7 +47,7 @@ LensSystem::LensSystem(const Problem& problem, const LensArrangement& arrangemen
       threads_(threads),
       poses_alone_(std::all_of(arrangement.tracks.lenses.begin(), arrangement.tracks.lenses.end(),
                                [](const LensPlaces& lens) { return lens.riders == 0; })),
-      layout_(arrangement.batches, arrangement.tracks, chunks_),
+      layout_(arrangement.batches, arrangement.tracks, chunks_, lists_.tiles),
       stage_(arrangement.columns) {
   fill_state(problem);
   factors_.allocate(kFactorGroup * arranged_.batches.groups.size());

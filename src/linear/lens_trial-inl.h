@@ -165,8 +165,11 @@ inline void lens_trial_chunk(const LensTrialInput& in, const Chunk& chunk, Trial
   TrialSums sums;
   for (int p = 0; p < kParts; ++p)
     sums.square[p] = sums.loss[p] = sums.damping[p] = sums.step2[p] = zero();
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+  const std::size_t groups = in.batches->groups.size();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    prefetch_groups(in.held.points, in.factors, 12, g + 1, std::min<std::size_t>(g + 2, groups));
     for (int p = 0; p < kParts; ++p) lens_trial_part<Robust>(in, g, p, out.points, sums);
+  }
   out.square_sum += sum_parts(sums.square);
   if (Robust) out.loss_sum += sum_parts(sums.loss);
   out.damping_term += sum_parts(sums.damping);

@@ -101,15 +101,13 @@ struct ProjectOnLanes {
 
   template <class Lens>
   HWY_INLINE void operator()(Lens) const {
+    if constexpr (kWanted == Wanted::parameters) return Lens::project(k, P, out);
     LensJacobian<Lane> J;
     Lens::project(k, P, J);
     for (int r = 0; r < 2; ++r) {
       out.pixel[r] = J.pixel[r];
       if constexpr (kWanted != Wanted::pixel)
         for (int i = 0; i < 3; ++i) out.point[r][i] = J.point[r][i];
-      if constexpr (kWanted == Wanted::parameters)
-        for (std::size_t i = 0; i < Lens::kParameters.size(); ++i)
-          out.parameters[r][i] = J.parameters[r][i];
     }
   }
 };

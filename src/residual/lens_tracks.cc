@@ -45,6 +45,8 @@ void place_lenses(const Problem& problem, const Fixed& fixed, LensTracks& out) {
     lens.first_block = out.num_blocks;
     out.num_blocks += lens.blocks;
     out.most_blocks = std::max<int>(out.most_blocks, lens.blocks);
+    for (std::size_t j = 0; j < 2; ++j)
+      out.most_width[j] = std::max(out.most_width[j], lens.width[j]);
     out.lenses.push_back(lens);
   }
 }

@@ -37,9 +37,10 @@ struct LensPlaces {
 struct LensTracks {
   std::vector<LensPlaces> lenses;
   std::vector<std::uint32_t> image_lens;
-  std::vector<LensPlaces> kinds;  ///< one lens of each kind
-  std::uint32_t num_blocks = 0;   ///< of images and of lenses
-  int most_blocks = 0;            ///< of any lens
+  std::vector<LensPlaces> kinds;             ///< one lens of each kind
+  std::uint32_t num_blocks = 0;              ///< of images and of lenses
+  int most_blocks = 0;                       ///< of any lens
+  std::array<std::uint8_t, 2> most_width{};  ///< of any lens's first and second block
 
   Buffer<std::uint32_t> lens;         ///< 8 per batch
   Buffer<std::int32_t> uniform_lens;  ///< per batch: the lens of all lanes, or -1
@@ -54,6 +55,11 @@ struct LensTracks {
     return static_cast<std::uint32_t>(first_slot[group + 1] - first_slot[group]);
   }
 };
+
+/// Blocks of lenses' own.
+inline std::size_t lens_blocks(const LensTracks& tracks) {
+  return tracks.num_blocks - tracks.image_lens.size();
+}
 
 LensTracks arrange_lenses(const Problem& problem, const Fixed& fixed, const Batches& batches,
                           Threads& threads);

@@ -129,7 +129,8 @@ Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const Solv
   LensChoice out;
   // Points that are held make no pairs: to form the matrix is then next to nothing.
   if (held || asked_for(counts, options.solver).kind != SolverKind::implicit_cg) {
-    out.chunks = cut_lens_chunks(batches, tracks, !held, threads);
+    out.chunks =
+        cut_lens_chunks(batches, tracks, held ? LensLists::own_lens : LensLists::pairs, threads);
     const std::uint64_t resident = resident_bytes() - listed_bytes(out.chunks);
     counts = count_lens_work(arranged, out.chunks, counts);
     Result<Choice> formed =
@@ -146,7 +147,7 @@ Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const Solv
   const MemoryHeld memory{resident_bytes(), peak_resident_bytes()};
   Result<Choice> last = choose_solver(counts, implicit, threads.count(), memory);
   if (!last.ok()) return last.error();
-  out.chunks = cut_lens_chunks(batches, tracks, false, threads);
+  out.chunks = cut_lens_chunks(batches, tracks, LensLists::diagonal, threads);
   out.choice = std::move(last).value();
   out.choice.plan.reason = std::move(reason);
   out.choice.plan.clusters = std::move(clusters);
