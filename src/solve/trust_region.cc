@@ -115,7 +115,7 @@ class Loop {
     cost_ = it.cost = trial.cost;
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
-    control_.accepted(it.gain_ratio, trial);
+    control_.accepted(it.gain_ratio, trial, it.linear_iterations);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
     const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
