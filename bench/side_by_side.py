@@ -108,7 +108,7 @@ def run_once(program, name, config, problem, threads, options, folder):
 def warm_up(line, environment, limit, memory_gb, folder):
     """One iteration by the same program, not measured, so that each run finds memory and caches as a
     run of itself leaves them. A virtual machine gives pages back to its host as a large process ends;
-    a run that follows one waits for them, 0.05 to 0.3 s where a solve takes 0.3 to 0.6."""
+    a run that follows one waits for them, 0.1 to 0.3 s where a solve takes 0.35 to 0.6."""
     short = list(line)
     short[short.index("--max-iterations") + 1] = "1"
     run_program(short, environment, 60 + 2 * limit, memory_gb, folder)
