@@ -87,6 +87,29 @@ HWY_INLINE hn::Vec<DF> load_blocks(DF d, const float* const* from) {
 }
 #endif
 
+#if HWY_TARGET <= HWY_AVX3
+using W16 = hn::Vec<hn::CappedTag<float, 16>>;
+
+/// Eight fields of sixteen records, from `k` on: half a vector of each record, so half the loads.
+HWY_INLINE void load_eight_fields(const float* const* of, int k, float* to) {
+  const hn::CappedTag<float, 16> d;
+  const hn::Half<decltype(d)> half;
+  W16 fields[2][4];  // blocks: field k of lanes 8 h .. 8 h + 3, k + 4 of these, both of the next
+  for (int h = 0; h < 2; ++h) {
+    W16 rows[4];
+    for (int i = 0; i < 4; ++i)
+      rows[i] =
+          hn::Combine(d, hn::Load(half, of[8 * h + 4 + i] + k), hn::Load(half, of[8 * h + i] + k));
+    transpose_blocks(rows, fields[h]);
+  }
+  for (int j = 0; j < 4; ++j) {
+    const auto low = fields[0][j].raw, high = fields[1][j].raw;
+    hn::Store(W16{_mm512_shuffle_f32x4(low, high, 0x88)}, d, to + (k + j) * 16);
+    hn::Store(W16{_mm512_shuffle_f32x4(low, high, 0xDD)}, d, to + (k + 4 + j) * 16);
+  }
+}
+#endif
+
 /// A record's fields as they lie in memory, a vector each.
 template <class DF>
 struct FloatFields {
@@ -114,6 +137,12 @@ HWY_INLINE void load_float_cameras(DF d, const float* cameras, const FloatBatch&
 #if HWY_TARGET != HWY_SCALAR
   const float* of[kPairLanes];
   for (int l = 0; l < N; ++l) of[l] = record(batch.image[(lane + l) / 8][(lane + l) % 8]);
+#if HWY_TARGET <= HWY_AVX3
+  if constexpr (N == 16) {
+    for (int k = 0; k < 24; k += 8) load_eight_fields(of, k, to);
+    return;
+  }
+#endif
   for (int k = 0; k < 24; k += 4) {
     hn::Vec<DF> rows[4], fields[4];
     for (int j = 0; j < 4; ++j) {
@@ -130,65 +159,84 @@ HWY_INLINE void load_float_cameras(DF d, const float* cameras, const FloatBatch&
 #endif
 }
 
-/// Nine values of one or two batches, lane by lane: rows[j][q] are fields 4 q' .. 4 q' + 3 of lane
-/// 4 b + j in block b, quads q' = 0, 1; the ninth field apart.
+/// Nine values of each lane of one or two batches: eight in a row of its own, the ninth apart.
 struct FloatRows {
-  alignas(64) float quad[2][4][kPairLanes];
+  alignas(64) float eight[kPairLanes][8];
   alignas(64) float ninth[kPairLanes];
+
+  /// Rows of lanes l and l + 4 are neighbours: so they come out of a transpose.
+  static HWY_INLINE int place(int lane) { return lane / 8 * 8 + lane % 4 * 2 + lane % 8 / 4; }
+  HWY_INLINE const float* row(int lane) const { return eight[place(lane)]; }
 
   template <class DF>
   HWY_INLINE void put(DF d, const hn::Vec<DF>* v, int part) {
     constexpr int N = static_cast<int>(hn::MaxLanes(DF()));
     const int lane = part * N;
-    hn::StoreU(v[8], d, ninth + lane);
-    for (int q = 0; q < 2; ++q) {
-#if HWY_TARGET != HWY_SCALAR
-      hn::Vec<DF> rows[4];
-      transpose_blocks(v + 4 * q, rows);
-      for (int j = 0; j < 4; ++j) hn::Store(rows[j], d, quad[q][j] + lane);
+    hn::Store(v[8], d, ninth + lane);
+#if HWY_TARGET == HWY_SCALAR
+    for (int k = 0; k < 8; ++k) eight[place(lane)][k] = hn::GetLane(v[k]);
 #else
-      for (int k = 0; k < 4; ++k) quad[q][lane % 4][4 * (lane / 4) + k] = hn::GetLane(v[4 * q + k]);
+    hn::Vec<DF> rows[2][4];  // of fields 0 to 3 and 4 to 7; lane 4 b + j in block b of the jth
+    for (int q = 0; q < 2; ++q) transpose_blocks(v + 4 * q, rows[q]);
+    for (int j = 0; j < 4; ++j) put_lanes(d, rows[0][j], rows[1][j], lane + j);
+#endif
+  }
+
+ private:
+#if HWY_TARGET != HWY_SCALAR
+  /// Lanes first, first + 4 ...: blocks of a vector.
+  template <class DF>
+  HWY_INLINE void put_lanes(DF d, hn::Vec<DF> low, hn::Vec<DF> high, int first) {
+    if constexpr (hn::MaxLanes(DF()) == 4) {
+      hn::Store(low, d, eight[place(first)]);
+      hn::Store(high, d, eight[place(first)] + 4);
+    } else if constexpr (hn::MaxLanes(DF()) == 8) {
+      hn::Store(hn::ConcatLowerLower(d, high, low), d, eight[place(first)]);
+      hn::Store(hn::ConcatUpperUpper(d, high, low), d, eight[place(first + 4)]);
+    } else {
+#if HWY_TARGET <= HWY_AVX3
+      const __m512d a = _mm512_castps_pd(low.raw), b = _mm512_castps_pd(high.raw);
+      const auto pick = [&](__m512i index, int lane) {
+        const __m512d both = _mm512_permutex2var_pd(a, index, b);
+        hn::Store(W16{_mm512_castpd_ps(both)}, d, eight[place(lane)]);
+      };
+      pick(_mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), first);
+      pick(_mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15), first + 8);
 #endif
     }
   }
+#endif
 };
 
-using DQ = hn::CappedTag<double, 4>;
-
-HWY_INLINE void add_promoted(hn::Vec<hn::Rebind<float, DQ>> v, double* to) {
-  const DQ d;
-  hn::Store(hn::Add(hn::Load(d, to), hn::PromoteTo(d, v)), d, to);
-}
+using DQ = hn::CappedTag<double, 8>;
 
 /// Adds one group's eight lanes to the images' records: where one image has them all, their sum in
 /// the fixed tree ((0+1)+(2+3)) + ((4+5)+(6+7)), else lane by lane.
 HWY_INLINE void scatter_floats(const FloatRows& rows, const FloatBatch& batch, int group,
                                double* sums) {
+  const DQ wide;
   const hn::Rebind<float, DQ> d;
   constexpr int N = static_cast<int>(hn::MaxLanes(DQ()));
+  const auto add = [&](hn::Vec<decltype(d)> v, double* to) {
+    hn::Store(hn::Add(hn::Load(wide, to), hn::PromoteTo(wide, v)), wide, to);
+  };
   const int lane = 8 * group;
+  const float* n = rows.ninth + lane;
   if (batch.uniform[group] >= 0) {
     double* to = sums + kProductRecord * static_cast<std::size_t>(batch.uniform[group]);
-    for (int q = 0; q < 2; ++q)
-      for (int i = 0; i < 4; i += N) {
-        const auto row = [&](int j, int at) {
-          return hn::Load(d, rows.quad[q][j] + lane + at + i);
-        };
-        const auto low = hn::Add(hn::Add(row(0, 0), row(1, 0)), hn::Add(row(2, 0), row(3, 0)));
-        const auto high = hn::Add(hn::Add(row(0, 4), row(1, 4)), hn::Add(row(2, 4), row(3, 4)));
-        add_promoted(hn::Add(low, high), to + 4 * q + i);
-      }
-    const float* n = rows.ninth + lane;
+    for (int i = 0; i < 8; i += N) {
+      const auto row = [&](int l) { return hn::Load(d, rows.row(lane + l) + i); };
+      const auto low = hn::Add(hn::Add(row(0), row(1)), hn::Add(row(2), row(3)));
+      const auto high = hn::Add(hn::Add(row(4), row(5)), hn::Add(row(6), row(7)));
+      add(hn::Add(low, high), to + i);
+    }
     to[8] += static_cast<double>(((n[0] + n[1]) + (n[2] + n[3])) + ((n[4] + n[5]) + (n[6] + n[7])));
     return;
   }
   for (int l = 0; l < 8; ++l) {
     double* to = sums + kProductRecord * static_cast<std::size_t>(batch.image[group][l]);
-    const int at = lane + l / 4 * 4;
-    for (int q = 0; q < 2; ++q)
-      for (int i = 0; i < 4; i += N)
-        add_promoted(hn::Load(d, rows.quad[q][l % 4] + at + i), to + 4 * q + i);
-    to[8] += static_cast<double>(rows.ninth[lane + l]);
+    for (int i = 0; i < 8; i += N) add(hn::Load(d, rows.row(lane + l) + i), to + i);
+    to[8] += static_cast<double>(n[l]);
   }
 }
 
@@ -235,9 +283,11 @@ HWY_INLINE void product_float_groups(const FloatProductInput& in, std::size_t g,
             X2 = hn::Load(d, groups.X[2] + lane);
     const W mask = hn::Load(d, groups.mask + lane);
     W s[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    // Apart, so that one observation's long chain does not keep the next one's loads waiting.
+    for (std::uint32_t o = 0; o < track; ++o)
+      load_float_cameras(d, in.cameras, batch_at(o), part, saved + kPart * (parts * o + part));
     for (std::uint32_t o = 0; o < track; ++o) {
       float* to = saved + kPart * (parts * o + part);
-      load_float_cameras(d, in.cameras, batch_at(o), part, to);
       const FloatFields<DF> c{to};
       W weight = mask;
       if constexpr (Robust) weight = hn::Mul(mask, weights_at(o, part));
