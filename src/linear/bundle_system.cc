@@ -174,7 +174,7 @@ Step BundleSystem::linearize(const StepRequest& request) {
   chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
   const EliminateInput in{&batches_,       &chunks_,    cameras_.data(), points_.data(),
                           request.damping, rules_.held, loss_,           chart_};
-  if (coarse_) coarse_->place(cameras_.data());
+  if (coarse_) coarse_->begin(cameras_.data(), request.damping);
   std::vector<EliminateOutput> outputs(slices);
   threads_.for_each(slices, [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[threads_.worker()];
@@ -232,6 +232,7 @@ bool BundleSystem::solve_cameras(const StepRequest& request, Step& step) {
   const CameraSolution solution = solver_->solve(camera_system(request), camera_step_);
   ++camera_solves_;
   step.linear_iterations = solution.iterations;
+  if (coarse_) coarse_->solved(solution.iterations);
   residual_ = solution.residual;
   cut_ = solution.cut;
   return solution.solved && std::all_of(camera_step_.begin(), camera_step_.begin() + columns_.count,
@@ -323,6 +324,7 @@ Trial BundleSystem::try_step(const DoglegStep& step) {
     decrease += camera_step_[c] * (vectors_.rhs[c] + damping_[c] * camera_step_[c]);
   out.plain_cost = square_sum / 2;
   out.cost = cost_of(square_sum, loss_sum);
+  trial_cost_ = out.cost;
   out.predicted_decrease = decrease / 2;
   out.step_norm = std::max(out.step_norm, std::sqrt(step2));
   return out;
@@ -334,6 +336,7 @@ double BundleSystem::cost_of(double square_sum, double loss_sum) const {
 }
 
 void BundleSystem::accept() {
+  if (coarse_) coarse_->moved(trial_cost_);
   std::swap(poses_, trial_poses_);
   std::swap(lenses_, trial_lenses_);
   std::swap(cameras_, trial_cameras_);

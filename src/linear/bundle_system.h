@@ -103,6 +103,7 @@ class BundleSystem : public System {
   std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   std::unique_ptr<CameraSolver> solver_;
   double mean_square_ = 0;  ///< 2 cost / observations at the held state
+  double trial_cost_ = 0;   ///< of the last state tried
   double point_decrease_ = 0;
   ScaledLoss loss_;  ///< of the last proposal
 

@@ -67,6 +67,7 @@ CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Cluster
       tiles_(count_cluster_pairs(tile_)),
       cholesky_(kCoarseModes * clusters_.count, kernels.name),
       coarse_(kCoarseModes * clusters_.count) {
+  own_.allocate(kCoarseTile * clusters_.count);
   std::vector<std::uint32_t> uses(static_cast<std::size_t>(columns.count), 0);
   for (std::size_t i = 0; i < columns.num_images(); ++i)
     if (const std::int32_t f = columns.image(i)[6]; f >= 0) ++uses[f];
@@ -75,11 +76,18 @@ CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Cluster
   sums_.allocate(slices * kCoarseTile * tiles_);
 }
 
+void CoarseSpace::begin(const double* cameras, double lambda) {
+  matrix_ = schedule_.next(lambda);
+  if (matrix_ == CoarseSchedule::Matrix::summed) place(cameras);
+}
+
 void CoarseSpace::clear(std::size_t slice) {
+  if (matrix_ != CoarseSchedule::Matrix::summed) return;
   std::fill_n(&sums_[slice * kCoarseTile * tiles_], kCoarseTile * tiles_, 0.0);
 }
 
 void CoarseSpace::add(std::size_t slice, const Chunk& chunk, const Records& records) {
+  if (matrix_ != CoarseSchedule::Matrix::summed) return;
   Buffer<double>& scratch = scratch_[threads_.worker()];
   if (scratch.size() == 0) scratch.allocate(coarse_scratch_doubles(batches_, clusters_.count));
   const CoarseInput in{basis_.data(), clusters_.of_image.data(), tile_.data(), clusters_.count};
@@ -143,10 +151,15 @@ void CoarseSpace::add_tiles() {
         for (int b = 0; b < (c > d ? 8 : a + 1); ++b)
           cholesky_.at(8 * c + a, 8 * d + b) -= tile[8 * a + b];
     }
+  for (std::int32_t c = 0; c < clusters_.count; ++c)
+    for (int a = 0; a < 8; ++a)
+      for (int b = 0; b <= a; ++b)
+        cholesky_.at(8 * c + a, 8 * c + b) += own_[kCoarseTile * c + 8 * a + b];
 }
 
-/// E_cc += Z_i^T (S_ii + D_i) Z_i.
-void CoarseSpace::add_diagonal(const double* diagonal, const double* damping) {
+/// Z_i^T S_ii Z_i, cluster by cluster.
+void CoarseSpace::sum_own(const double* diagonal) {
+  own_.fill(0);
   for (std::size_t i = 0; i < columns_.num_images(); ++i) {
     const std::int32_t c = clusters_.of_image[i];
     if (c == Clusters::kNone) continue;
@@ -154,17 +167,29 @@ void CoarseSpace::add_diagonal(const double* diagonal, const double* damping) {
     double SZ[kRows][8] = {};
     for (int r = 0; r < kRows; ++r)
       for (int k = 0; k < kRows; ++k) {
-        double s = diagonal_entry(diagonal + kDiagonalDoubles * i, r, k);
-        const std::int32_t column = columns_.image(i)[r];
-        if (r == k && column >= 0) s += damping[column];
+        const double s = diagonal_entry(diagonal + kDiagonalDoubles * i, r, k);
         for (int m = 0; m < 8; ++m) SZ[r][m] += s * Z[8 * k + m];
       }
+    double* tile = &own_[kCoarseTile * c];
     for (int a = 0; a < 8; ++a)
-      for (int b = 0; b <= a; ++b) {
-        double sum = 0;
-        for (int r = 0; r < kRows; ++r) sum += Z[8 * r + a] * SZ[r][b];
-        cholesky_.at(8 * c + a, 8 * c + b) += sum;
-      }
+      for (int b = 0; b <= a; ++b)
+        for (int r = 0; r < kRows; ++r) tile[8 * a + b] += Z[8 * r + a] * SZ[r][b];
+  }
+}
+
+/// E_cc += Z_i^T D_i Z_i.
+void CoarseSpace::add_damping(const double* damping) {
+  for (std::size_t i = 0; i < columns_.num_images(); ++i) {
+    const std::int32_t c = clusters_.of_image[i];
+    if (c == Clusters::kNone) continue;
+    const double* Z = basis(i);
+    for (int r = 0; r < kRows; ++r) {
+      const std::int32_t column = columns_.image(i)[r];
+      if (column < 0) continue;
+      for (int a = 0; a < 8; ++a)
+        for (int b = 0; b <= a; ++b)
+          cholesky_.at(8 * c + a, 8 * c + b) += Z[8 * r + a] * damping[column] * Z[8 * r + b];
+    }
   }
 }
 
@@ -182,10 +207,14 @@ void CoarseSpace::scale() {
 }
 
 bool CoarseSpace::factor(const double* diagonal, const double* damping) {
-  add_slices(sums_, slices_, threads_);
+  if (matrix_ == CoarseSchedule::Matrix::unneeded) return false;
+  if (matrix_ == CoarseSchedule::Matrix::summed) {
+    add_slices(sums_, slices_, threads_);
+    sum_own(diagonal);
+  }
   cholesky_.clear(threads_);
   add_tiles();
-  add_diagonal(diagonal, damping);
+  add_damping(damping);
   scale();
   return cholesky_.factor(threads_);
 }
@@ -223,7 +252,7 @@ std::uint64_t CoarseSpace::bytes() const {
 std::uint64_t CoarseSpace::bytes(std::uint64_t images, std::uint64_t clusters, std::uint64_t tiles,
                                  std::uint64_t slices) {
   const std::uint64_t modes = kCoarseModes * clusters;
-  return 8 * kCoarseTile * tiles * slices + DenseCholesky::bytes(modes) + 16 * modes +
+  return 8 * kCoarseTile * (tiles * slices + clusters) + DenseCholesky::bytes(modes) + 16 * modes +
          2 * clusters * (clusters + 1) + images * (8 * kCoarseBasis + 5);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "linear/clusters.h"
+#include "linear/coarse_schedule.h"
 #include "linear/columns.h"
 #include "linear/dense_cholesky.h"
 #include "linear/kernels.h"
@@ -17,20 +18,25 @@ namespace sheaf {
 
 /// Clusters of images that move as rigid bodies which may also grow and zoom: Z has kCoarseModes
 /// columns for each cluster, and E = Z^T (S + D) Z. Schur-Jacobi passes a correction on from image
-/// to image; a solve with E carries it through the scene at once (docs/math.md, section 7).
+/// to image; a solve with E carries it through the scene at once (docs/math.md, section 7). Z and S
+/// in E may be those of an earlier state (CoarseSchedule), D is always the present one.
 class CoarseSpace {
  public:
   CoarseSpace(const Batches& batches, const Columns& columns, Clusters clusters, std::size_t slices,
               const Kernels& kernels, Threads& threads);
 
-  /// Z at the held state: cameras holds kCameraRecord per image.
-  void place(const double* cameras);
-  /// The sums of a slice of chunks, by the thread that works at it.
+  /// Before a state is linearised with this relative damping: whether E is needed, and if so summed
+  /// anew with Z at this state. cameras holds kCameraRecord per image.
+  void begin(const double* cameras, double lambda);
+  /// The sums of a slice of chunks, by the thread that works at it; nothing where E is kept.
   void clear(std::size_t slice);
   void add(std::size_t slice, const Chunk& chunk, const Records& records);
-  /// Adds the slices, forms E with S's diagonal blocks and factors it. False where E is not
-  /// positive definite to rounding: no correction then.
+  /// Forms E, from the new sums and S's diagonal blocks or from those kept, and factors it. False
+  /// where it is not needed or not positive definite to rounding: no correction then.
   bool factor(const double* diagonal, const double* damping);
+  /// What a solve with the correction took, and the cost of a state that is gone on to.
+  void solved(int iterations) { schedule_.solved(iterations); }
+  void moved(double cost) { schedule_.moved(cost); }
   /// z += Z E^-1 Z^T r.
   void add_correction(const double* r, double* z) const;
 
@@ -42,9 +48,11 @@ class CoarseSpace {
                              std::uint64_t slices);
 
  private:
+  void place(const double* cameras);
   void place_image(std::size_t image, const double* camera);
+  void sum_own(const double* diagonal);
   void add_tiles();
-  void add_diagonal(const double* diagonal, const double* damping);
+  void add_damping(const double* damping);
   void scale();
 
   const Batches& batches_;
@@ -60,7 +68,10 @@ class CoarseSpace {
   Buffer<double> basis_;
   std::vector<std::int32_t> tile_;  ///< number_cluster_pairs
   std::size_t tiles_;
-  Buffer<double> sums_;  ///< kCoarseTile per tile, one set per slice
+  Buffer<double> sums_;  ///< kCoarseTile per tile, one set per slice, the first ends up as the sum
+  Buffer<double> own_;   ///< Z^T S Z of S's diagonal blocks alone, kCoarseTile per cluster
+  CoarseSchedule schedule_;
+  CoarseSchedule::Matrix matrix_ = CoarseSchedule::Matrix::unneeded;
   DenseCholesky cholesky_;
   mutable Buffer<double> coarse_;
 };

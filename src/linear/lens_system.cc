@@ -145,6 +145,7 @@ Step LensSystem::propose(const StepRequest& request) {
   const bool corrected = coarse_ && coarse_->factor(diagonal_.data(), stage_.damping());
   step.solved = std::isfinite(square_sum) &&
                 stage_.solve(sums, request, corrected ? coarse_.get() : nullptr, step);
+  if (coarse_) coarse_->solved(step.linear_iterations);
   return step;
 }
 
@@ -157,7 +158,7 @@ void LensSystem::linearize(const StepRequest& request, std::vector<EliminateOutp
   if (weights_.size() != weights) weights_.allocate(weights);
   const LensEliminateInput in{
       {&arranged_.batches, &tracks, held_.view()}, request.damping, rules_.points_held, loss_};
-  if (coarse_) coarse_->place(held_.images.data());
+  if (coarse_) coarse_->begin(held_.images.data(), request.damping);
   threads_.for_each(num_slices(), [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(layout_.doubles);
@@ -260,6 +261,7 @@ Trial LensSystem::trial() {
   }
   out.plain_cost = square_sum / 2;
   out.cost = cost_of(square_sum, loss_sum);
+  trial_cost_ = out.cost;
   out.predicted_decrease = decrease / 2;
   out.step_norm = std::max(out.step_norm, std::sqrt(step2));
   if (rules_.watch_behind) out.newly_behind = count_newly_unseen();
@@ -271,7 +273,10 @@ double LensSystem::cost_of(double square_sum, double loss_sum) const {
   return (loss_.kind == LossKind::none || !std::isfinite(square_sum) ? square_sum : loss_sum) / 2;
 }
 
-void LensSystem::accept() { std::swap(held_, tried_); }
+void LensSystem::accept() {
+  if (coarse_) coarse_->moved(trial_cost_);
+  std::swap(held_, tried_);
+}
 
 bool LensSystem::sees(const State& state, std::uint64_t batch, std::uint32_t lane,
                       const double* X) const {

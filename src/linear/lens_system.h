@@ -95,7 +95,7 @@ class LensSystem : public System {
   std::unique_ptr<CoarseSpace> coarse_;  ///< of an iterative solver, where it pays
   CameraStage stage_;
   ScaledLoss loss_;
-  double mean_square_ = 0, point_decrease_ = 0;
+  double mean_square_ = 0, point_decrease_ = 0, trial_cost_ = 0;
 };
 
 }  // namespace sheaf

@@ -83,7 +83,7 @@ struct Linearised {
     const EliminateInput in{&batches, &chunks, cameras.data(), points.data(), lambda, false};
     EliminateOutput out{factors.data(), 0, 0, 0};
     const Records records = records_in(scratch.data(), chunks);
-    coarse->place(cameras.data());
+    coarse->begin(cameras.data(), lambda);
     for (std::size_t s = 0; s + 1 < chunks.slices.size(); ++s) {
       coarse->clear(s);
       for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
@@ -163,21 +163,26 @@ std::vector<double> corrected(const Matrix& S, const Matrix& Z, const std::vecto
   return z;
 }
 
+/// Of a right-hand side, with S + D and Z as they are in `l`.
+void expect_same_correction(const Linearised& l, const char* kernels) {
+  const Clusters clusters =
+      cluster_images(Covisibility(l.batches, kImages, l.threads), l.columns, 6);
+  std::vector<double> r(l.columns.count), z(l.columns.count, 0.25);
+  for (std::size_t i = 0; i < r.size(); ++i) r[i] = std::sin(1.0 + 3 * double(i));
+  const std::vector<double> expected = corrected(l.system(), l.basis(clusters), r);
+  l.coarse->add_correction(r.data(), z.data());
+  double scale = 0;
+  for (double x : expected) scale = std::max(scale, std::abs(x));
+  for (std::size_t i = 0; i < r.size(); ++i)
+    ASSERT_NEAR(z[i] - 0.25, expected[i], 1e-6 * scale) << kernels << " column " << i;
+}
+
 void expect_explicit_correction(const Fixed& fixed, std::uint32_t images_per_lens) {
   for (const Kernels* kernels : available_kernels()) {
     const Linearised l(fixed, images_per_lens, 1e-3, 6, *kernels);
     ASSERT_TRUE(l.factored);
     ASSERT_GE(l.coarse->num_clusters(), 3);
-    const Clusters clusters =
-        cluster_images(Covisibility(l.batches, kImages, l.threads), l.columns, 6);
-    std::vector<double> r(l.columns.count), z(l.columns.count, 0.25);
-    for (std::size_t i = 0; i < r.size(); ++i) r[i] = std::sin(1.0 + 3 * double(i));
-    const std::vector<double> expected = corrected(l.system(), l.basis(clusters), r);
-    l.coarse->add_correction(r.data(), z.data());
-    double scale = 0;
-    for (double x : expected) scale = std::max(scale, std::abs(x));
-    for (std::size_t i = 0; i < r.size(); ++i)
-      ASSERT_NEAR(z[i] - 0.25, expected[i], 1e-6 * scale) << kernels->name << " column " << i;
+    expect_same_correction(l, kernels->name);
   }
 }
 
@@ -194,6 +199,25 @@ TEST(CoarseSpace, CorrectsAsTheMatrixMultipliedOutWithPartsHeld) {
 TEST(CoarseSpace, CorrectsAsTheMatrixMultipliedOutWithSharedLenses) {
   expect_explicit_correction({}, 4);
   expect_explicit_correction({}, kImages);
+}
+
+/// S and Z of the state it was summed at, whatever the next state's cameras, and the new damping.
+TEST(CoarseSpace, AMatrixThatIsKeptTakesTheNewDamping) {
+  const Kernels& kernels = reference_kernels();
+  Linearised l({}, 1, 1e-3, 6, kernels);
+  ASSERT_TRUE(l.factored);
+  for (double& d : l.damping) d *= 0.5;
+  Buffer<double> elsewhere(l.cameras.size());
+  elsewhere.fill(1);
+  l.coarse->begin(elsewhere.data(), 5e-4);
+  l.coarse->clear(0);
+  ASSERT_TRUE(l.coarse->factor(nullptr, l.damping.data()));
+  expect_same_correction(l, kernels.name);
+}
+
+TEST(CoarseSpace, StrongDampingNeedsNone) {
+  const Linearised l({}, 1, 1e-2, 6, reference_kernels());
+  EXPECT_FALSE(l.factored);
 }
 
 /// Moving, turning or growing the whole scene changes no pixel: S knows nothing of it.
