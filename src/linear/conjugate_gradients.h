@@ -86,8 +86,8 @@ class ConjugateGradients {
  private:
   static constexpr int kMaxIterations = 500;
   /// The first few parts of the decrease can be small by chance: stopping at two of them cost
-  /// trafalgar-like scenes a trust region step.
-  static constexpr int kMinIterations = 6;
+  /// trafalgar-like scenes a trust region step, six cost all scenes iterations.
+  static constexpr int kMinIterations = 4;
 
   /// z = H r
   template <class Preconditioner>
