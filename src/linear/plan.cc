@@ -58,17 +58,17 @@ std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vec
 double seconds(double nanoseconds) { return 1e-9 * nanoseconds; }
 
 /// Times of one step's camera solve on one core, measured: 4.5 ns to multiply a pair and, spread
-/// over half a dozen steps, nearly as much to have listed it; 5.5 ns an observation for an implicit
+/// over half a dozen steps, nearly as much to have listed it; 5 ns an observation for an implicit
 /// product in mixed precision, 12 ns a block for an explicit one. To place a tile: a guess.
-constexpr double kPairNs = 8, kImplicitNs = 5.5, kBlockNs = 12, kPlaceNs = 200,
-                 kDenseFlopsPerNs = 85;
+constexpr double kPairNs = 8, kImplicitNs = 5, kBlockNs = 12, kPlaceNs = 200, kDenseFlopsPerNs = 85;
 /// An observation's part in an implicit product through lenses of any model.
 constexpr double kLensImplicitNs = 30;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
-double iterations(const WorkCounts& c) { return c.clusters > 0 ? 15 : 25; }
-/// The coarse matrix: an observation's part in it, its factor's entries to substitute with.
-constexpr double kCoarseNs = 12, kCoarseEntryNs = 0.5;
+double iterations(const WorkCounts& c) { return c.clusters > 0 ? 9 : 15; }
+/// The coarse matrix: an observation's part in it, every other step; its factor's entries to
+/// substitute with.
+constexpr double kCoarseNs = 6, kCoarseEntryNs = 0.5;
 double coarse_seconds(const WorkCounts& c) {
   const double n = kCoarseModes * static_cast<double>(c.clusters);
   return seconds(kCoarseNs * static_cast<double>(c.observations) * (c.clusters > 0) +
@@ -76,13 +76,15 @@ double coarse_seconds(const WorkCounts& c) {
 }
 
 /// S's blocks as slices of sums: multiplied into, and 704 bytes of each cleared, added to and
-/// summed, which for many slices outweighs the products. Set so that dubrovnik-356's order of
-/// solvers comes out as timed.
-constexpr double kSliceTileNs = 400;
+/// summed, which for many slices outweighs the products where they are more than a cache holds. Set
+/// so that the order of solvers comes out as timed for dubrovnik-356 and for 64 to 90 images.
+constexpr double kSliceTileNs = 400, kCachedSliceTileNs = 80, kCachedBytes = 32e6;
 double forming_seconds(const WorkCounts& c) {
   const int slices = count_slices(linearize_flops(c.batches, c.pairs), c.tiles, c.images);
+  const double tiles = slices * static_cast<double>(c.tiles);
+  const bool cached = 8 * kTileDoubles * tiles < kCachedBytes;
   return seconds(kPairNs * static_cast<double>(c.pairs) +
-                 kSliceTileNs * slices * static_cast<double>(c.tiles));
+                 (cached ? kCachedSliceTileNs : kSliceTileNs) * tiles);
 }
 
 /// Measured: below a thousand columns clearing, filling and substituting weigh as much as flops.
