@@ -151,10 +151,15 @@ def run_undisturbed(*arguments, retries):
 
 def in_turn(solvers, turn):
     """The first turn in the order given, the others shuffled: what a run finds of memory and caches
-    is what the one before left, and that must not be the same solver's every time."""
+    is what the one before left, and that must not be the same solver's every time. Configurations of
+    one solver follow each other: a large process before a small one then meets one of them a turn."""
     order = list(solvers)
     if turn > 0:
-        random.Random(turn).shuffle(order)
+        shuffle = random.Random(turn).shuffle
+        shuffle(order)
+        names = list(dict.fromkeys(name for name, *_ in order))
+        shuffle(names)
+        order.sort(key=lambda solver: names.index(solver[0]))
     return order
 
 
