@@ -216,8 +216,7 @@ def growth(documents):
 
 def growth_plot(documents):
     most = max(d["threads"] for d in documents)
-    lines = {l: p for l, p in growth(documents).items()
-             if l.startswith("sheaf") or l.endswith(f", {most} thr.")}
+    lines = {l: p for l, p in growth(documents).items() if l.endswith(f", {most} thr.")}
     points = [p for line in lines.values() for p in line]
     if not points:
         return None

@@ -77,17 +77,16 @@ CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Cluster
 }
 
 void CoarseSpace::begin(const double* cameras, double lambda) {
-  matrix_ = schedule_.next(lambda);
-  if (matrix_ == CoarseSchedule::Matrix::summed) place(cameras);
+  if (schedule_.next(lambda) == CoarseSchedule::Matrix::summed) place(cameras);
 }
 
 void CoarseSpace::clear(std::size_t slice) {
-  if (matrix_ != CoarseSchedule::Matrix::summed) return;
+  if (schedule_.matrix() != CoarseSchedule::Matrix::summed) return;
   std::fill_n(&sums_[slice * kCoarseTile * tiles_], kCoarseTile * tiles_, 0.0);
 }
 
 void CoarseSpace::add(std::size_t slice, const Chunk& chunk, const Records& records) {
-  if (matrix_ != CoarseSchedule::Matrix::summed) return;
+  if (schedule_.matrix() != CoarseSchedule::Matrix::summed) return;
   Buffer<double>& scratch = scratch_[threads_.worker()];
   if (scratch.size() == 0) scratch.allocate(coarse_scratch_doubles(batches_, clusters_.count));
   const CoarseInput in{basis_.data(), clusters_.of_image.data(), tile_.data(), clusters_.count};
@@ -207,8 +206,8 @@ void CoarseSpace::scale() {
 }
 
 bool CoarseSpace::factor(const double* diagonal, const double* damping) {
-  if (matrix_ == CoarseSchedule::Matrix::unneeded) return false;
-  if (matrix_ == CoarseSchedule::Matrix::summed) {
+  if (schedule_.matrix() == CoarseSchedule::Matrix::unneeded) return false;
+  if (schedule_.matrix() == CoarseSchedule::Matrix::summed) {
     add_slices(sums_, slices_, threads_);
     sum_own(diagonal);
   }

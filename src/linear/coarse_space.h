@@ -71,7 +71,6 @@ class CoarseSpace {
   Buffer<double> sums_;  ///< kCoarseTile per tile, one set per slice, the first ends up as the sum
   Buffer<double> own_;   ///< Z^T S Z of S's diagonal blocks alone, kCoarseTile per cluster
   CoarseSchedule schedule_;
-  CoarseSchedule::Matrix matrix_ = CoarseSchedule::Matrix::unneeded;
   DenseCholesky cholesky_;
   mutable Buffer<double> coarse_;
 };

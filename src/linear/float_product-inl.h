@@ -283,11 +283,9 @@ HWY_INLINE void product_float_groups(const FloatProductInput& in, std::size_t g,
             X2 = hn::Load(d, groups.X[2] + lane);
     const W mask = hn::Load(d, groups.mask + lane);
     W s[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    // Apart, so that one observation's long chain does not keep the next one's loads waiting.
-    for (std::uint32_t o = 0; o < track; ++o)
-      load_float_cameras(d, in.cameras, batch_at(o), part, saved + kPart * (parts * o + part));
     for (std::uint32_t o = 0; o < track; ++o) {
       float* to = saved + kPart * (parts * o + part);
+      load_float_cameras(d, in.cameras, batch_at(o), part, to);
       const FloatFields<DF> c{to};
       W weight = mask;
       if constexpr (Robust) weight = hn::Mul(mask, weights_at(o, part));

@@ -16,9 +16,9 @@ constexpr double kLargestDamping = 1e32;
 /// Gain ratios this close to 1 come from a model that was exact.
 constexpr double kExact = 0.02, kCarefulDamping = 1e-4;
 /// As the damping falls, conjugate gradients see ever smaller eigenvalues: at a tenth, iterations
-/// double. From these on it falls to a fifth. final-13682-like needs 30 to 40 iterations a step so
-/// instead of 80, and is as soon at 1e-3 of the optimum and sooner at 1e-4; scenes of up to 1778
-/// images are much the same.
+/// double. From these on it falls to a fifth. With tighter solves than today's final-13682-like
+/// needed 30 to 40 iterations a step so instead of 80, and was as soon at 1e-3 of the optimum and
+/// sooner at 1e-4; scenes of up to 1778 images were much the same.
 constexpr int kManyIterations = 16;
 
 /// lambda, and how fast it grows while steps are rejected (Nielsen's rule; Madsen, Nielsen,
