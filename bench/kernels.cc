@@ -11,12 +11,12 @@
 #include <memory>
 #include <string>
 
+#include "eliminate/kernel_table.h"
 #include "geometry/rotation.h"
-#include "linear/bundle_system.h"
-#include "linear/dense_cholesky.h"
-#include "linear/kernel_table.h"
 #include "machine_peak.h"
+#include "reduced/dense_cholesky.h"
 #include "sheaf/sheaf.h"
+#include "systems/bundle_system.h"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
-#include "photometric_demo.h"
+#include "photometric/photometric_demo.h"
 #include "progress.h"
 #include "report/errors.h"
 #include "scene_arguments.h"

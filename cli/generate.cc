@@ -8,11 +8,11 @@
 #include <string>
 
 #include "counting_sink.h"
-#include "generate_photometric.h"
 #include "inspect/statistics.h"
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "photometric/generate_photometric.h"
 #include "platform/memory.h"
 #include "scene_arguments.h"
 #include "sheaf/sheaf.h"

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 // For scalars in namespace sheaf; once more on lanes, for each instruction set, in the namespace
-// that residual/lens_lanes-inl.h sets: what runs there must be compiled there.
+// that rows/lens_lanes-inl.h sets: what runs there must be compiled there.
 #if !defined(SHEAF_GEOMETRY_LENS_H_) || defined(SHEAF_LENSES_ON_LANES)
 #define SHEAF_GEOMETRY_LENS_H_
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "residual/photometric.h"
+#include "rows/photometric.h"
 #include "sheaf/error.h"
 #include "sheaf/photometric.h"
 

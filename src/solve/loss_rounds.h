@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "linear/system.h"
 #include "platform/clock.h"
 #include "sheaf/options.h"
 #include "sheaf/solve.h"
+#include "systems/system.h"
 
 namespace sheaf {
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "residual/anchor.h"
-#include "residual/photometric.h"
+#include "rows/anchor.h"
+#include "rows/photometric.h"
 #include "sheaf/photometric.h"
 
 namespace sheaf {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "residual/photometric.h"
+#include "rows/photometric.h"
 
 namespace sheaf {
 

@@ -7,18 +7,18 @@
 #include <new>
 #include <utility>
 
-#include "linear/kernel_table.h"
-#include "linear/photometric_system.h"
+#include "eliminate/kernel_table.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "sheaf/solve.h"
-#include "solve/choose_solver.h"
 #include "solve/patch_anchor.h"
 #include "solve/patch_level.h"
 #include "solve/patch_statistics.h"
 #include "solve/photometric_forecast.h"
 #include "solve/photometric_rules.h"
 #include "solve/trust_region.h"
+#include "systems/choose_solver.h"
+#include "systems/photometric_system.h"
 
 namespace sheaf {
 namespace {

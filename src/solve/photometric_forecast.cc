@@ -8,12 +8,12 @@
 #include <set>
 #include <vector>
 
-#include "linear/chunks.h"
-#include "linear/forecast.h"
-#include "linear/photometric_system.h"
+#include "lists/chunks.h"
 #include "platform/pages.h"
 #include "solve/patch_anchor.h"
 #include "solve/patch_level.h"
+#include "systems/forecast.h"
+#include "systems/photometric_system.h"
 
 namespace sheaf {
 namespace {

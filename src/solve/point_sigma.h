@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "geometry/loss.h"
-#include "residual/photometric.h"
+#include "rows/photometric.h"
 
 namespace sheaf {
 

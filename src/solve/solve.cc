@@ -7,18 +7,18 @@
 #include <string>
 #include <utility>
 
-#include "linear/bundle_system.h"
-#include "linear/image_system.h"
-#include "linear/kernel_table.h"
-#include "linear/lens_system.h"
+#include "eliminate/kernel_table.h"
+#include "lists/lent_observations.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
-#include "residual/lent_observations.h"
 #include "scene/behind.h"
-#include "solve/bal_view.h"
-#include "solve/choose_solver.h"
 #include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
+#include "systems/bal_view.h"
+#include "systems/bundle_system.h"
+#include "systems/choose_solver.h"
+#include "systems/image_system.h"
+#include "systems/lens_system.h"
 
 namespace sheaf {
 namespace {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <optional>
 
-#include "linear/system.h"
 #include "sheaf/options.h"
+#include "systems/system.h"
 
 namespace sheaf {
 

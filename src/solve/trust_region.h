@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <limits>
 
-#include "linear/system.h"
 #include "platform/clock.h"
 #include "sheaf/options.h"
 #include "sheaf/solve.h"
+#include "systems/system.h"
 
 namespace sheaf {
 

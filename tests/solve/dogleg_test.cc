@@ -12,13 +12,13 @@
 #include <limits>
 #include <vector>
 
+#include "eliminate/kernel_table.h"
 #include "geometry/rigid_motion.h"
-#include "linear/bundle_system.h"
-#include "linear/kernel_table.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
 #include "solve/scenes.h"
 #include "solve/textbook.h"
+#include "systems/bundle_system.h"
 
 namespace sheaf {
 namespace {

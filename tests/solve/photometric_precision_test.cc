@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "geometry/rigid_motion.h"
-#include "residual/photometric.h"
+#include "rows/photometric.h"
 #include "sheaf/sheaf.h"
 #include "solve/patch_level.h"
 

@@ -16,7 +16,7 @@
 #include "geometry/loss.h"
 #include "geometry/rotation.h"
 #include "report/errors.h"
-#include "residual/photometric.h"
+#include "rows/photometric.h"
 #include "sheaf/sheaf.h"
 #include "solve/patch_level.h"
 #include "solve/photometric_scenes.h"

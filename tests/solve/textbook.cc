@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "geometry/camera_model.h"
-#include "linear/scaling.h"
+#include "reduced/scaling.h"
 #include "sheaf/solve.h"
 #include "solve/scenes.h"
 

@@ -1,0 +1,129 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "exit_code.h"
+#include "interrupt.h"
+#include "photometric/photometric_arguments.h"
+#include "photometric/photometric_document.h"
+#include "photometric/photometric_outputs.h"
+#include "progress.h"
+#include "sheaf/sheaf.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  PhotometricArguments photometric;
+  PhotometricOutputArguments outputs;
+  std::string in;
+};
+
+std::string summary_text(const PhotometricSummary& summary, const PhotometricDetails& details) {
+  const Summary& s = summary.solve;
+  std::string out;
+  out += fmt::format("patches     {} of {} seen at the start, {} of these left at the end\n",
+                     summary.patches_visible, summary.patches_total, summary.patches_left);
+  out += fmt::format("cost        {:.9e} -> {:.9e}\n", s.initial_cost, s.final_cost);
+  out += fmt::format("rms         {:.5g} -> {:.5g} grey levels\n", summary.initial_rms_grey,
+                     summary.final_rms_grey);
+  out += fmt::format("median      {:.5g} -> {:.5g} grey levels\n", summary.initial_median_grey,
+                     summary.final_median_grey);
+  out += fmt::format("inliers     {:.1f}% -> {:.1f}% of the pixels within 10 grey levels\n",
+                     100 * summary.initial_inlier_share, 100 * summary.final_inlier_share);
+  out += fmt::format("sigma       a pixel {:.3g} grey levels, {} {:.3g} (median)\n",
+                     details.sigma_grey, details.of_inverse_depth ? "an inverse depth" : "a point",
+                     median_sigma(details));
+  if (summary.measurements > 0)
+    out += fmt::format("anchor      {} measured positions, rms {:.5g} -> {:.5g} px\n",
+                       summary.measurements, summary.initial_rms_px, summary.final_rms_px);
+  out += fmt::format("iterations  {}\n", s.iterations.empty() ? 0 : s.iterations.size() - 1);
+  out += fmt::format("stopped     {}\n", s.words);
+  out +=
+      fmt::format("memory      {:.0f} MB forecast\n", 1e-6 * static_cast<double>(s.forecast_bytes));
+  out += fmt::format("time        set-up {:.3f} s, solve {:.3f} s; {}, {} thread{}\n", s.setup_s,
+                     s.solve_s, s.simd, s.threads, s.threads == 1 ? "" : "s");
+  return out;
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  PhotometricOutputs outputs(arguments.outputs, arguments.common.json);
+  PhotometricFolder folder =
+      read_photometric(arguments.in, read_options(arguments.photometric.input)).value();
+  std::optional<PoseErrors> before, after;
+  if (!folder.given_poses.empty()) before = pose_errors(folder);
+  PhotometricProblem& problem = folder.problem;
+  Progress progress(arguments.common.quiet);
+  PhotometricOptions options = photometric_options(arguments.photometric);
+  options.threads = arguments.common.threads;
+  options.stop = interrupt.token();
+  options.on_iteration = [&](const Iteration& iteration) {
+    progress.report(iteration);
+    return true;
+  };
+  outputs.remember(problem, options);
+  interrupt.begin_solve();
+  const PhotometricSummary summary = refine_photometric(problem, options).value();
+  interrupt.begin_write();
+  if (before) after = pose_errors(folder);
+  const Timer writing;
+  if (!summary.solve.rounds.empty()) options.loss.scale_px = summary.solve.rounds.back().scale_px;
+  const PhotometricDetails details = examine_photometric(problem, options).value();
+  if (summary.solve.usable()) outputs.write(folder, details, options);
+  const double write_s = writing.seconds();
+  fmt::print("{}: {} images, {} points\n", arguments.in, problem.images.size(),
+             problem.num_points());
+  for (const std::string& note : folder.notes) fmt::print("note        {}\n", note);
+  fmt::print("{}", summary_text(summary, details));
+  if (before)
+    fmt::print("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
+               before->rotation_rad, after->rotation_rad, before->center, after->center);
+  for (std::size_t i = 0; i < problem.brightness.size(); ++i)
+    fmt::print("image {:<5} a {:.4f}, b {:.3f}\n", i, problem.brightness[i].a,
+               problem.brightness[i].b);
+  if (!outputs.pictures().empty())
+    fmt::print("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
+  if (!arguments.common.json.empty()) {
+    const PhotometricRecord record{arguments.in,       folder.format, arguments.photometric,
+                                   outputs.pictures(), folder.read_s, write_s,
+                                   total.seconds(),    before,        after};
+    write_json(photometric_json(record, summary, details, problem), arguments.common.json);
+  }
+  return exit_code_of(summary.solve.termination);
+}
+
+}  // namespace
+
+void add_photometric(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& verb =
+      *app.add_subcommand("photometric", "refine poses and points from the pixels of images");
+  verb.add_option("IN", arguments->in,
+                  "folder of images with poses and points, of RGB-D images with poses, or of a "
+                  "COLMAP model "
+                  "of pinholes (told by its files: docs/photometric.md)")
+      ->type_name("FOLDER")
+      ->required();
+  add_photometric_output_options(verb, arguments->outputs);
+  add_photometric_options(verb, arguments->photometric);
+  add_common_options(verb, arguments->common);
+  verb.footer(
+      "Example:\n  sheaf photometric scene -o refined --pictures pictures --ply refined.ply\n"
+      "\nRGB-D images, depths as measured, from coarse to fine:\n"
+      "  sheaf photometric rgbd --intrinsics 525,525,319.5,239.5 --fix points --levels 4 -o "
+      "refined\n"
+      "\nA COLMAP model with its images:\n"
+      "  sheaf photometric sparse/0 --images images -o refined\n"
+      "\nA scene to try it on:\n  sheaf generate scene --photometric");
+  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace sheaf

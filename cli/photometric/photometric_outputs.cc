@@ -1,0 +1,64 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "photometric/photometric_outputs.h"
+
+#include <filesystem>
+
+#include "io/folder_files.h"
+#include "outputs.h"
+#include "report/photometric_pictures.h"
+#include "sheaf/solve.h"
+
+namespace sheaf {
+
+void add_photometric_output_options(CLI::App& verb, PhotometricOutputArguments& a) {
+  verb.add_option("-o,--output", a.out,
+                  "folder for the refined state in the same format, with brightness.txt, "
+                  "visibility.txt and sigma.txt")
+      ->type_name("FOLDER");
+  verb.add_option("--ply", a.ply,
+                  "also write start (grey) and result (in the images' colours), with cameras, as "
+                  "one PLY")
+      ->type_name("FILE");
+  verb.add_option(
+          "--pictures", a.pictures,
+          "folder for PNGs: the worst and the middle patches before and after, and a map of "
+          "residuals for each image")
+      ->type_name("FOLDER");
+}
+
+PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& arguments,
+                                       const std::string& json)
+    : arguments_(arguments) {
+  std::string probe;
+  if (!arguments_.pictures.empty()) {
+    make_folder(arguments_.pictures).value();
+    probe = std::filesystem::path(arguments_.pictures) / "worst-patches.png";
+  }
+  check_outputs({{"--ply", arguments_.ply}, {"--pictures", probe}, {"--json", json}});
+}
+
+void PhotometricOutputs::remember(const PhotometricProblem& start,
+                                  const PhotometricOptions& options) {
+  if (!arguments_.ply.empty()) start_ = cloud_of(start);
+  if (!arguments_.pictures.empty())
+    stage_ = stage_of(start, options, examine_photometric(start, options).value());
+}
+
+void PhotometricOutputs::write(const PhotometricFolder& folder, const PhotometricDetails& details,
+                               const PhotometricOptions& options) {
+  const PhotometricProblem& problem = folder.problem;
+  if (!arguments_.out.empty()) {
+    write_photometric(folder, arguments_.out).value();
+    write_photometric_details(details, problem.num_points(), arguments_.out).value();
+  }
+  if (start_)
+    write_ply(*start_, coloured_cloud_of(folder, details.seen).value(), arguments_.ply).value();
+  if (!stage_) return;
+  const PatchComparison comparison =
+      compare_patches(problem, options, std::move(*stage_), stage_of(problem, options, details))
+          .value();
+  pictures_ = write_pictures(comparison, problem.images, arguments_.pictures).value();
+}
+
+}  // namespace sheaf

@@ -1,0 +1,68 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The kernels of eliminate/image_kernels.h once more, one observation at a time.
+#include <algorithm>
+#include <cmath>
+
+#include "eliminate/image_kernels.h"
+#include "geometry/bal_camera.h"
+
+namespace sheaf {
+namespace {
+
+struct Observed {
+  double r[2];
+  BalJacobian<double> j;
+};
+
+Observed observe(const double* batches, std::uint32_t batch, std::uint32_t lane, const double* c) {
+  const double* z = batches + ImageBatches::kBatchDoubles * batch + lane;
+  Matrix3<double> R;
+  std::copy(c, c + 9, R.begin());
+  Observed out;
+  out.j = project_with_jacobian<double>(R, {c[9], c[10], c[11]}, {c[12], c[13], c[14]},
+                                        {z[0], z[8], z[16]});
+  for (int d = 0; d < 2; ++d) out.r[d] = out.j.pixel[d] - z[24 + 8 * d];
+  return out;
+}
+
+void sum(const double* batches, const ImageBatches::Piece& piece, const double* camera,
+         const ScaledLoss& loss, bool lens, double* sums) {
+  std::fill_n(sums, image_sums::kCount, 0.0);
+  for (std::uint32_t b = 0; b < piece.batches; ++b) {
+    const std::uint32_t lanes = b + 1 == piece.batches ? piece.last_lanes : 8;
+    for (std::uint32_t l = 0; l < lanes; ++l) {
+      const Observed o = observe(batches, b, l, camera);
+      const double square = o.r[0] * o.r[0] + o.r[1] * o.r[1];
+      const LossValue<double> rho = evaluate_loss(loss, square);
+      sums[image_sums::kSquare] += square;
+      if (loss.kind != LossKind::none) sums[image_sums::kLoss] += rho.value;
+      for (int row = 0; row < 2; ++row) {
+        const double* J = &o.j.camera[9 * row];
+        for (int i = 0; i < (lens ? 9 : 6); ++i) {
+          sums[image_sums::kGradient + i] += rho.first * J[i] * o.r[row];
+          for (int k = 0; k <= i; ++k) sums[image_sums::entry(i, k)] += rho.first * J[i] * J[k];
+        }
+      }
+    }
+  }
+}
+
+void residuals(const double* batches, const ImageBatches::Piece& piece, const double* camera,
+               double* out) {
+  for (std::uint32_t b = 0; b < piece.batches; ++b)
+    for (std::uint32_t l = 0; l < 8; ++l) {
+      const Observed o = observe(batches, b, l, camera);
+      for (int d = 0; d < 2; ++d) out[16 * b + 8 * d + l] = std::fabs(o.r[d]);
+    }
+}
+
+}  // namespace
+
+const ImageKernels& reference_image_kernels() {
+  static const ImageKernels table = {"reference", &sum, &residuals};
+  return table;
+}
+
+}  // namespace sheaf

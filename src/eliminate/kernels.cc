@@ -1,0 +1,143 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "eliminate/kernels.h"
+
+#include "eliminate/kernel_table.h"
+#include "platform/simd_targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "eliminate/kernels.cc"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+// After foreach_target.h:
+#include <hwy/highway.h>
+
+#include "eliminate/coarse-inl.h"
+#include "eliminate/eliminate-inl.h"
+#include "eliminate/float_product-inl.h"
+#include "eliminate/products-inl.h"
+#include "eliminate/schur_product-inl.h"
+#include "eliminate/trial-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+// Each is compiled with and without a loss, and with and without charts of the points, so that a
+// problem that has none pays nothing for those that do.
+void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
+               EliminateOutput& out) {
+  const bool robust = in.loss.kind != LossKind::none;
+  if (in.chart.base == ChartBase::none)
+    robust ? linearize_chunk<true, false>(in, chunk, records, out)
+           : linearize_chunk<false, false>(in, chunk, records, out);
+  else
+    robust ? linearize_chunk<true, true>(in, chunk, records, out)
+           : linearize_chunk<false, true>(in, chunk, records, out);
+}
+
+void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
+              const Records& records, double* sums) {
+  diagonal_products(batches, chunks, chunk, records, sums);
+}
+
+void pairs(const Chunks& chunks, const Chunk& chunk, const Records& records, double* tiles) {
+  pair_products(chunks, chunk, records, tiles);
+}
+
+void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
+            const CoarseInput& in, double* scratch, double* sums) {
+  coarse_products(batches, chunk, records, in, scratch, sums);
+}
+
+void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
+  const bool robust = in.loss.kind != LossKind::none;
+  if (in.chart.base == ChartBase::none)
+    robust ? trial_chunk<true, false>(in, chunk, out) : trial_chunk<false, false>(in, chunk, out);
+  else
+    robust ? trial_chunk<true, true>(in, chunk, out) : trial_chunk<false, true>(in, chunk, out);
+}
+
+void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {
+  if (in.weights == nullptr)
+    product_chunk<false>(in, chunk, saved, y);
+  else
+    product_chunk<true>(in, chunk, saved, y);
+}
+
+void residuals(const Batches& batches, const double* cameras, const double* points,
+               const Chunk& chunk, double* out) {
+  residuals_chunk(batches, cameras, points, chunk, out);
+}
+
+void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved, double* y) {
+  if (in.weights == nullptr)
+    product_float_chunk<false>(in, chunk, saved, y);
+  else
+    product_float_chunk<true>(in, chunk, saved, y);
+}
+
+double square_sum(const Batches& batches, const double* cameras, const double* points,
+                  const Chunk& chunk) {
+  return square_sum_chunk(batches, cameras, points, chunk);
+}
+
+std::uint64_t count_behind(const Batches& batches, const double* cameras, const double* points,
+                           const Chunk& chunk) {
+  return count_behind_chunk(batches, cameras, points, chunk);
+}
+
+Kernels table(const char* name, bool fused) {
+  return {name,   fused,    &linearize,     &diagonal,  &pairs,      &coarse,
+          &trial, &product, &product_float, &residuals, &square_sum, &count_behind};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sheaf {
+
+std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
+  return (kTRecord + kCRecord) * 8 * chunks.most_batches +
+         std::size_t(26 * 8) * batches.longest_track;
+}
+
+std::size_t product_scratch_doubles(const Batches& batches) {
+  // The wider of 16 fields of eight doubles and 31 of sixteen floats.
+  return std::size_t(31 * 8) * batches.longest_track;
+}
+
+std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters) {
+  return (24 + 1) * coarse_scratch_clusters(batches, clusters);
+}
+
+Records records_in(double* scratch, const Chunks& chunks) {
+  double* C = scratch + kTRecord * 8 * chunks.most_batches;
+  return {scratch, C, C + kCRecord * 8 * chunks.most_batches};
+}
+
+std::vector<const Kernels*> available_kernels() {
+  std::vector<const Kernels*> out;
+  const std::int64_t supported = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+  static const Kernels avx512 = N_AVX3::table("avx512", true);
+  if (supported & HWY_AVX3) out.push_back(&avx512);
+#endif
+#if HWY_TARGETS & HWY_AVX2
+  static const Kernels avx2 = N_AVX2::table("avx2", true);
+  if (supported & HWY_AVX2) out.push_back(&avx2);
+#endif
+#if HWY_TARGETS & HWY_SSE4
+  static const Kernels sse4 = N_SSE4::table("sse4", false);
+  if (supported & HWY_SSE4) out.push_back(&sse4);
+#endif
+  static const Kernels baseline =
+      HWY_STATIC_DISPATCH(table)(HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline", false);
+  out.push_back(&baseline);
+  (void)supported;
+  return out;
+}
+
+}  // namespace sheaf
+#endif  // HWY_ONCE

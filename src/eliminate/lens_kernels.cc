@@ -1,0 +1,141 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "eliminate/lens_kernels.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "platform/simd_targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "eliminate/lens_kernels.cc"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+// After foreach_target.h:
+#include <hwy/highway.h>
+
+#include "eliminate/lens_eliminate-inl.h"
+#include "eliminate/lens_product-inl.h"
+#include "eliminate/lens_products-inl.h"
+#include "eliminate/lens_trial-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+void linearize_lenses(const LensEliminateInput& in, const Chunk& chunk, const LensRecords& records,
+                      EliminateOutput& out) {
+  if (in.loss.kind == LossKind::none)
+    eliminate_lens_chunk<false>(in, chunk, records, out);
+  else
+    eliminate_lens_chunk<true>(in, chunk, records, out);
+}
+
+void multiply_lenses(const LensTracks& tracks, const LensTiles& tiles_of, const Chunks& chunks,
+                     const Chunk& chunk, const LensRecords& records, double* diagonal,
+                     double* tiles) {
+  lens_products(tracks, tiles_of, chunks, chunk, records, diagonal, tiles);
+}
+
+void multiply_poses(const Chunks& chunks, const Chunk& chunk, const Records& records,
+                    double* tiles) {
+  pose_pair_products(chunks, chunk, records, tiles);
+}
+
+void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) {
+  if (in.loss.kind == LossKind::none)
+    lens_trial_chunk<false>(in, chunk, out);
+  else
+    lens_trial_chunk<true>(in, chunk, out);
+}
+
+void multiply_by_lenses(const LensProductInput& in, const Chunk& chunk, double* saved, double* y) {
+  const std::size_t groups = in.of.batches->groups.size();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    prefetch_groups(in.of.at.points, in.factors, 6, g + 1, std::min<std::size_t>(g + 2, groups));
+    lens_product_group(in, g, saved, y);
+  }
+}
+
+void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    const Batches::Group& group = in.batches->groups[g];
+    for (int lane = 0; lane < 8; lane += kLanes) {
+      const double* from = in.at.points + kPointGroup * g + lane;
+      const V X[3] = {load(from), load(from + 8), load(from + 16)};
+      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+        LensView s;
+        look<Wanted::pixel, false>(*in.batches, *in.tracks, in.at, b, lane, X, s);
+        for (int r = 0; r < 2; ++r)
+          store(hn::Abs(hn::Sub(s.J.pixel[r].v, load(&in.batches->xy[16 * b + 8 * r + lane]))),
+                out + 16 * (b - chunk.first_batch) + 8 * r + lane);
+      }
+    }
+  }
+}
+
+LensKernels lens_table(const char* name) {
+  return {name,        &linearize_lenses,   &multiply_lenses, &multiply_poses,
+          &try_lenses, &multiply_by_lenses, &lens_residuals};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sheaf {
+namespace {
+
+std::uint64_t most_slots(const LensTracks& tracks, const Chunks& chunks) {
+  std::uint64_t most = 0;
+  for (const Chunk& chunk : chunks.chunks)
+    most = std::max(most, slots_before(tracks, chunk, chunk.end_group));
+  return most;
+}
+
+}  // namespace
+
+LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
+                         const LensTiles& tiles) {
+  // More blocks than these are not cleared and flushed for every chunk.
+  constexpr std::size_t kFewBlocks = 8;
+  const std::size_t all_blocks = lens_blocks(tracks);
+  const bool sums = tiles.of_image.empty() && all_blocks > 0 && all_blocks <= kFewBlocks;
+  const std::size_t observations = 8 * chunks.most_batches;
+  const auto row_blocks = static_cast<std::size_t>(tracks.most_blocks);
+  const std::size_t recorded = sums ? 0 : row_blocks;
+  std::size_t rows = 0;
+  for (std::size_t g = 0; g < batches.groups.size(); ++g)
+    rows = std::max<std::size_t>(rows, tracks.slots_of(g));
+  C = kTRecord * (observations + (sums ? 0 : 8 * most_slots(tracks, chunks)));
+  lens = C + kCRecord * observations;
+  slots = lens + kLensRecord * recorded * observations;
+  blocks = slots + 27 * 8 * (rows + 1);
+  jacobians = blocks + (sums ? kBlockSums * (all_blocks + 1) : 0);
+  doubles = jacobians + 8 * (26 + 18 * row_blocks) * batches.longest_track;
+}
+
+std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tracks) {
+  return 8 * (26 + 18 * static_cast<std::size_t>(tracks.most_blocks)) * batches.longest_track;
+}
+
+const LensKernels& lens_kernels(const char* simd_name) {
+  [[maybe_unused]] const std::string_view name = simd_name;
+#if HWY_TARGETS & HWY_AVX3
+  static const LensKernels avx512 = N_AVX3::lens_table("avx512");
+  if (name == avx512.name) return avx512;
+#endif
+#if HWY_TARGETS & HWY_AVX2
+  static const LensKernels avx2 = N_AVX2::lens_table("avx2");
+  if (name == avx2.name) return avx2;
+#endif
+#if HWY_TARGETS & HWY_SSE4
+  static const LensKernels sse4 = N_SSE4::lens_table("sse4");
+  if (name == sse4.name) return sse4;
+#endif
+  static const LensKernels baseline = HWY_STATIC_DISPATCH(lens_table)("baseline");
+  return baseline;
+}
+
+}  // namespace sheaf
+#endif  // HWY_ONCE

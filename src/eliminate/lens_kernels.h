@@ -1,0 +1,112 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "eliminate/kernels.h"
+#include "lists/lens_tracks.h"
+
+namespace sheaf {
+
+/// Records of 24 doubles. Of an image: R (9, row-major), t (3), the step to back-substitute: rho
+/// (3), phi (3). Of a lens: parameters (12), their step (12).
+constexpr std::size_t kLensStateRecord = 24;
+namespace lens_record {
+constexpr int kPoseStep = 12, kParameterStep = 12;
+}
+
+/// A state of images, lenses and points (kPointGroup per group).
+struct LensState {
+  const double *images, *lenses, *points;
+};
+
+struct LensInput {
+  const Batches* batches;
+  const LensTracks* tracks;
+  LensState at;
+};
+
+struct LensEliminateInput {
+  LensInput of;
+  double damping;
+  bool points_held;
+  ScaledLoss loss{};
+};
+
+/// Records of one chunk. Those of observations are as elimination of any rows leaves them; the T
+/// records of the points' slots, T_l = sum T over the observations through one lens, follow them
+/// in T. `lens` has, for each observation and block of its lens, what the products between the
+/// lens and itself or the image need: with J the lens's columns,
+///   C = Lm^T J,   G = Lm^-1 (J - B T_l^T),   so that a^T G = J_a^T J - T_a T_l^T for C_a = Lm^T
+///   J_a:
+/// C's two rows (8 each), G's two rows, then, where a lens has nine columns in the block, their
+/// ninths: C (2), G (2), 4 unused. Where only diagonal blocks of a few lenses are wanted, `blocks`
+/// holds these as they are summed, and there are no records of lenses and slots.
+struct LensRecords {
+  Records image;
+  double* lens;
+  double* slots;   ///< of one group's sums T_l
+  double* blocks;  ///< kBlockSums per block of a lens and one more; nullptr: not so summed
+};
+/// The records laid out for any of these chunks in one thread's scratch.
+struct LensScratch {
+  std::size_t C, lens, slots, blocks, jacobians, doubles;  ///< from the start, T's; in all
+
+  LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
+              const LensTiles& tiles);
+  LensRecords in(double* scratch) const {
+    return {{scratch, scratch + C, scratch + jacobians},
+            scratch + lens,
+            scratch + slots,
+            jacobians > blocks ? scratch + blocks : nullptr};
+  }
+};
+struct LensTrialInput {
+  const Batches* batches;
+  const LensTracks* tracks;
+  LensState held;   ///< with the step
+  LensState tried;  ///< stepped; its points are not read
+  const double* factors;
+  int inner_iterations;
+  double mean_square;
+  ScaledLoss loss{};
+  const double* weights = nullptr;
+};
+
+/// x: kProductRecord doubles for each block of an image or a lens, nine of them used.
+struct LensProductInput {
+  LensInput of;
+  const double* factors;
+  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  const double* x = nullptr;
+};
+/// Doubles of `saved` that a product needs.
+std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tracks);
+
+/// One instruction set's kernels for lenses of any model, over one chunk.
+struct LensKernels {
+  const char* name;
+  /// As Kernels::linearize, with the slots' and the lenses' records.
+  void (*linearize)(const LensEliminateInput&, const Chunk&, const LensRecords&,
+                    EliminateOutput& out);
+  /// Adds to the sums of a slice what concerns lenses' blocks: all of their diagonal blocks, and
+  /// the tiles of a lens with itself or an image of its own. Pairs of an image and another's lens
+  /// are pairs of T records like any other.
+  void (*products)(const LensTracks&, const LensTiles&, const Chunks&, const Chunk&,
+                   const LensRecords&, double* diagonal, double* tiles);
+  /// As Kernels::pairs, of images whose blocks are poses alone.
+  void (*pose_pairs)(const Chunks&, const Chunk&, const Records&, double* tiles);
+  /// As Kernels::trial; newly_behind is not counted.
+  void (*trial)(const LensTrialInput&, const Chunk&, TrialOutput& out);
+  /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, likewise by blocks.
+  void (*product)(const LensProductInput&, const Chunk&, double* saved, double* y);
+  /// |r_x| of a batch's eight lanes, then |r_y|, 16 per batch of the chunk.
+  void (*residuals)(const LensInput&, const Chunk&, double* out);
+};
+
+/// simd_name: as of Kernels.
+const LensKernels& lens_kernels(const char* simd_name);
+
+}  // namespace sheaf

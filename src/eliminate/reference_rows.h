@@ -1,0 +1,198 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "eliminate/kernels.h"
+#include "geometry/bal_camera.h"
+
+namespace sheaf {
+
+// What the reference kernels share: one observation, one point, in plain scalar code.
+
+struct Observed {
+  Matrix3<double> R;
+  Vector3<double> t;
+  BalCamera<double> camera;
+};
+
+inline Observed camera_of(const double* cameras, std::uint32_t image) {
+  const double* c = cameras + kCameraRecord * image;
+  Observed o;
+  std::copy(c, c + 9, o.R.begin());
+  std::copy(c + 9, c + 12, o.t.begin());
+  o.camera = {c[12], c[13], c[14]};
+  return o;
+}
+
+inline Vector3<double> point_of(const double* points, std::size_t group, std::uint32_t lane) {
+  const double* X = points + kPointGroup * group + lane;
+  return {X[0], X[8], X[16]};
+}
+
+/// One observation with its residual and the exact Jacobians.
+struct Row {
+  std::array<double, 2> r;
+  BalJacobian<double> j;
+
+  double square() const { return r[0] * r[0] + r[1] * r[1]; }
+  /// Times sqrt(rho'); returns rho of what it was.
+  LossValue<double> apply(const ScaledLoss& loss) {
+    const LossValue<double> rho = evaluate_loss(loss, square());
+    scale(std::sqrt(rho.first));
+    return rho;
+  }
+  void scale(double by) {
+    for (double& x : r) x *= by;
+    for (double& x : j.camera) x *= by;
+    for (double& x : j.point) x *= by;
+  }
+};
+
+inline Row row_of(const Batches& batches, const double* cameras, const Vector3<double>& X,
+                  std::uint64_t batch, std::uint32_t lane) {
+  const Observed o = camera_of(cameras, batches.image[8 * batch + lane]);
+  Row row;
+  row.j = project_with_jacobian(o.R, o.t, o.camera, X);
+  row.r = {row.j.pixel[0] - batches.xy[16 * batch + lane],
+           row.j.pixel[1] - batches.xy[16 * batch + 8 + lane]};
+  return row;
+}
+
+/// Lower factor L of V + D, with the solve by L.
+struct Factor3 {
+  double l00 = 0, l10 = 0, l20 = 0, l11 = 0, l21 = 0, l22 = 0;
+  bool held = false;
+
+  static Factor3 of(const std::array<double, 9>& A) {
+    Factor3 f;
+    f.l00 = std::sqrt(A[0]);
+    f.l10 = A[3] / f.l00;
+    f.l20 = A[6] / f.l00;
+    f.l11 = std::sqrt(A[4] - f.l10 * f.l10);
+    f.l21 = (A[7] - f.l10 * f.l20) / f.l11;
+    f.l22 = std::sqrt(A[8] - f.l20 * f.l20 - f.l21 * f.l21);
+    return f;
+  }
+  Vector3<double> forward(const double* s) const {
+    if (held) return {0, 0, 0};
+    Vector3<double> y;
+    y[0] = s[0] / l00;
+    y[1] = (s[1] - l10 * y[0]) / l11;
+    y[2] = (s[2] - l20 * y[0] - l21 * y[1]) / l22;
+    return y;
+  }
+  Vector3<double> backward(const Vector3<double>& y) const {
+    Vector3<double> x;
+    x[2] = y[2] / l22;
+    x[1] = (y[1] - l21 * x[2]) / l11;
+    x[0] = (y[0] - l10 * x[1] - l20 * x[2]) / l00;
+    return x;
+  }
+};
+
+/// The base of a point's chart.
+inline Vector3<double> base_of(const ChartRules& rules, const Batches& batches,
+                               const Batches::Group& group, std::uint32_t lane,
+                               const double* cameras) {
+  if (rules.base != ChartBase::host) return rules.origin;
+  const Observed o = camera_of(cameras, batches.image[8 * group.first_batch + lane]);
+  Vector3<double> C{};
+  for (int k = 0; k < 3; ++k)
+    for (int r = 0; r < 3; ++r) C[k] -= o.R[3 * r + k] * o.t[r];
+  return C;
+}
+
+/// The chart of the point X about a base; without charts its coordinates are X, Y and Z.
+struct PointCoordinates {
+  const ChartRules& rules;
+  Vector3<double> base;
+  PointChart<double> chart;
+
+  PointCoordinates(const ChartRules& chosen, const Vector3<double>& about, const Vector3<double>& X)
+      : rules(chosen),
+        base(about),
+        chart(chosen, {X[0] - base[0], X[1] - base[1], X[2] - base[2]}) {}
+
+  bool plain() const { return rules.base == ChartBase::none; }
+  Vector3<double> of(const Vector3<double>& d) const { return plain() ? d : chart.coordinates(d); }
+  /// diag(E^T V E), E = dX/dq.
+  Vector3<double> diagonal(const Matrix3<double>& V) const {
+    Vector3<double> out{V[0], V[4], V[8]};
+    for (int i = 0; !plain() && i < 3; ++i) {
+      Vector3<double> q{};
+      q[i] = 1;
+      const Vector3<double> e = chart.apply(q), Ve = multiply(V, e);
+      out[i] = e[0] * Ve[0] + e[1] * Ve[1] + e[2] * Ve[2];
+    }
+    return out;
+  }
+  /// A += E^-T D E^-1.
+  void damp(const Vector3<double>& D, double by, Matrix3<double>& A) const {
+    Vector3<double> column[3];
+    for (int i = 0; i < 3; ++i) {
+      Vector3<double> d{};
+      d[i] = 1;
+      column[i] = of(d);
+    }
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        for (int k = 0; k < 3; ++k) A[3 * i + j] += by * column[i][k] * D[k] * column[j][k];
+  }
+  /// Where the point ends after the step d, its base having moved.
+  Vector3<double> step(const Vector3<double>& d, const Vector3<double>& moved) const {
+    Vector3<double> e, out;
+    for (int k = 0; k < 3; ++k) e[k] = d[k] - (moved[k] - base[k]);
+    if (!plain()) e = chart.retract(rules, e);
+    for (int k = 0; k < 3; ++k) out[k] = plain() ? base[k] + chart.Y[k] + d[k] : moved[k] + e[k];
+    return out;
+  }
+};
+
+/// Jc dc, from the step in the camera record: phi, rho, df, k1 df + f dk1, k2 df + f dk2.
+inline std::array<double, 2> camera_motion(const Row& row, const double* record) {
+  const double* s = record + camera_record::kStep;
+  const double f = record[12];
+  const double dk1 = (s[7] - record[13] * s[6]) / f, dk2 = (s[8] - record[14] * s[6]) / f;
+  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6], dk1, dk2};
+  std::array<double, 2> e{};
+  for (int r = 0; r < 2; ++r)
+    for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];
+  return e;
+}
+
+inline double weight_of(const double* weights, std::uint64_t batch, std::uint32_t lane) {
+  return weights == nullptr ? 1 : weights[8 * batch + lane];
+}
+
+/// s += Jp^T w e.
+inline void add_to_point(const Row& row, double w, const std::array<double, 2>& e,
+                         Vector3<double>& s) {
+  for (int i = 0; i < 3; ++i) s[i] += w * (row.j.point[i] * e[0] + row.j.point[3 + i] * e[1]);
+}
+
+inline Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {
+  const auto at = [&](int i) { return factor[8 * i]; };
+  const double u0 = s[0] * at(0);
+  const double u1 = (s[1] - at(1) * u0) * at(3);
+  const double u2 = (s[2] - at(2) * u0 - at(4) * u1) * at(5);
+  const double v0 = at(6) - u0, v1 = at(7) - u1, v2 = at(8) - u2;
+  Vector3<double> d;
+  d[2] = v2 * at(5);
+  d[1] = (v1 - at(4) * d[2]) * at(3);
+  d[0] = (v0 - at(1) * d[1] - at(2) * d[2]) * at(0);
+  return d;
+}
+
+inline double depth(const double* cameras, std::uint32_t image, const Vector3<double>& X) {
+  const Observed o = camera_of(cameras, image);
+  return multiply(o.R, X)[2] + o.t[2];
+}
+
+/// The kernel `trial` (eliminate/kernels.h).
+void trial_by_reference(const TrialInput& in, const Chunk& chunk, TrialOutput& out);
+
+}  // namespace sheaf

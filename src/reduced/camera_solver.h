@@ -1,0 +1,90 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+
+#include "eliminate/kernels.h"
+#include "lists/chunks.h"
+#include "lists/columns.h"
+#include "platform/buffer.h"
+#include "platform/parallel.h"
+
+namespace sheaf {
+
+/// The reduced camera system before damping, as the elimination leaves it.
+struct ReducedSums {
+  const Chunks* chunks;
+  const double* tiles;     ///< kTileDoubles per tile
+  const double* diagonal;  ///< kDiagonalDoubles per image
+};
+
+/// Entry (r, k) of an image's symmetric diagonal block, stored 8 + 1.
+double diagonal_entry(const double* block, int r, int k);
+/// Entry (r, k) of a tile: row image's r, column image's k.
+double tile_entry(const double* tile, int r, int k);
+
+/// Right-hand side b and diag(J^T J) of the free columns.
+struct CameraVectors {
+  Buffer<double> rhs, squares;
+  void gather(const ReducedSums& sums, const Columns& columns);
+};
+
+class CoarseSpace;
+
+/// (S + D) x = b, to solve exactly or, by an iterative solver, until the quadratic model's
+/// decrease per step falls below `forcing` of its mean.
+struct CameraSystem {
+  ReducedSums sums;
+  const CameraVectors* vectors;
+  const double* damping;  ///< D: one for each column
+  double forcing = 0.1;
+  const std::function<bool()>* cancelled = nullptr;
+  const CoarseSpace* coarse = nullptr;  ///< factored; null: none
+  bool precise = false;                 ///< in double, even by a mixed solver
+  /// An iterative solver stops where |x|_C reaches it, C = D / lambda (Steihaug 1983).
+  double radius = std::numeric_limits<double>::infinity();
+  double lambda = 0;
+  bool dogleg = false;  ///< keep what shorten() needs
+};
+
+struct CameraSolution {
+  bool solved = false;
+  int iterations = 0;                ///< of an iterative solver
+  const double* residual = nullptr;  ///< b - (S + D) x, until the next solve; null: none is left
+  bool cut = false;                  ///< x ends at the radius
+};
+
+/// The seam inside one home of a System: how the camera system is solved.
+class CameraSolver {
+ public:
+  virtual ~CameraSolver() = default;
+  /// x has room for the columns rounded up to a multiple of 8.
+  virtual CameraSolution solve(const CameraSystem& system, Buffer<double>& x) = 0;
+  /// What solve() would have found with the smaller radius that alone is new, without another
+  /// product; not solved: its x keeps within that radius, or the solver ends nowhere before.
+  virtual CameraSolution shorten(const CameraSystem&, Buffer<double>&) { return {}; }
+  virtual std::uint64_t bytes() const = 0;
+};
+
+/// S formed and factored as one dense matrix.
+std::unique_ptr<CameraSolver> make_dense_solver(const Columns& columns, const Kernels& kernels,
+                                                Threads& threads);
+
+/// S stored by supernodes in an order that keeps fill low, and factored there.
+std::unique_ptr<CameraSolver> make_sparse_solver(const Columns& columns, const Chunks& chunks,
+                                                 const Kernels& kernels, Threads& threads);
+
+/// One small system for each image: exact where images do not couple (points held, own lenses).
+std::unique_ptr<CameraSolver> make_block_solver(const Columns& columns, Threads& threads);
+
+/// Conjugate gradients on S formed as blocks, preconditioned by its diagonal blocks; mixed: blocks
+/// of floats.
+std::unique_ptr<CameraSolver> make_explicit_solver(const Columns& columns, const Chunks& chunks,
+                                                   bool mixed, const Kernels& kernels,
+                                                   Threads& threads);
+
+}  // namespace sheaf

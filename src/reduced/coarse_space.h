@@ -1,0 +1,81 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "eliminate/kernels.h"
+#include "lists/columns.h"
+#include "platform/buffer.h"
+#include "platform/parallel.h"
+#include "reduced/clusters.h"
+#include "reduced/coarse_schedule.h"
+#include "reduced/dense_cholesky.h"
+
+namespace sheaf {
+
+/// Clusters of images that move as rigid bodies which may also grow and zoom: Z has kCoarseModes
+/// columns for each cluster, and E = Z^T (S + D) Z. Schur-Jacobi passes a correction on from image
+/// to image; a solve with E carries it through the scene at once (docs/math.md, section 7). Z and S
+/// in E may be those of an earlier state (CoarseSchedule), D is always the present one.
+class CoarseSpace {
+ public:
+  CoarseSpace(const Batches& batches, const Columns& columns, Clusters clusters, std::size_t slices,
+              const Kernels& kernels, Threads& threads);
+
+  /// Before a state is linearised with this relative damping: whether E is needed, and if so summed
+  /// anew with Z at this state. cameras holds kCameraRecord per image.
+  void begin(const double* cameras, double lambda);
+  /// The sums of a slice of chunks, by the thread that works at it; nothing where E is kept.
+  void clear(std::size_t slice);
+  void add(std::size_t slice, const Chunk& chunk, const Records& records);
+  /// Forms E, from the new sums and S's diagonal blocks or from those kept, and factors it. False
+  /// where it is not needed or not positive definite to rounding: no correction then.
+  bool factor(const double* diagonal, const double* damping);
+  /// What a solve with the correction took, and the cost of a state that is gone on to.
+  void solved(int iterations) { schedule_.solved(iterations); }
+  void moved(double cost) { schedule_.moved(cost); }
+  /// z += Z E^-1 Z^T r.
+  void add_correction(const double* r, double* z) const;
+
+  std::int32_t num_clusters() const { return clusters_.count; }
+  /// Z of an image: rows 0..6 of its nine x modes, row-major.
+  const double* basis(std::size_t image) const { return &basis_[kCoarseBasis * image]; }
+  std::uint64_t bytes() const;
+  static std::uint64_t bytes(std::uint64_t images, std::uint64_t clusters, std::uint64_t tiles,
+                             std::uint64_t slices);
+
+ private:
+  void place(const double* cameras);
+  void place_image(std::size_t image, const double* camera);
+  void sum_own(const double* diagonal);
+  void add_tiles();
+  void add_damping(const double* damping);
+  void scale();
+
+  const Batches& batches_;
+  const Columns& columns_;
+  const Kernels& kernels_;
+  Threads& threads_;
+  Clusters clusters_;
+  std::vector<char> zooms_;  ///< images whose focal length is free and their own
+  std::size_t slices_;
+  std::vector<Buffer<double>> scratch_;
+  std::vector<std::array<double, 3>> centres_;  ///< of the clusters' cameras
+  std::vector<double> scale_;                   ///< of each mode: E has a unit diagonal
+  Buffer<double> basis_;
+  std::vector<std::int32_t> tile_;  ///< number_cluster_pairs
+  std::size_t tiles_;
+  Buffer<double> sums_;  ///< kCoarseTile per tile, one set per slice, the first ends up as the sum
+  Buffer<double> own_;   ///< Z^T S Z of S's diagonal blocks alone, kCoarseTile per cluster
+  CoarseSchedule schedule_;
+  DenseCholesky cholesky_;
+  mutable Buffer<double> coarse_;
+};
+
+/// The clusters of a coarse space, or none where there are too few images for one to pay.
+Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads& threads);
+
+}  // namespace sheaf

@@ -1,0 +1,73 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lists/batches.h"
+#include "lists/chunks.h"
+#include "lists/columns.h"
+#include "platform/parallel.h"
+#include "reduced/clusters.h"
+
+namespace sheaf {
+
+/// How the camera system is solved.
+enum class SolverKind { blocks, dense, sparse, explicit_cg, implicit_cg };
+
+/// "blocks", "dense", "sparse", "iterative-explicit", "iterative-implicit".
+const char* to_string(SolverKind kind);
+
+/// What decides how much a solver costs; counted before it allocates anything.
+struct WorkCounts {
+  std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
+  std::uint64_t pairs = 0;  ///< of observations of one point: products to form S
+  std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
+  /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
+  double sparse_flops = 0;
+  std::uint64_t sparse_doubles = 0;
+  std::uint64_t sparse_bytes = 0;  ///< beside these
+  /// Of the coarse space of the iterative solvers; 0: none.
+  std::uint64_t clusters = 0, cluster_pairs = 0;
+  std::uint32_t longest_track = 0;
+  std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
+  bool lens_shared = false;
+  bool images_couple = true;      ///< some free point or shared lens couples images
+  bool weighted = false;          ///< a loss leaves a weight for each observation
+  bool dogleg = false;            ///< the gradient is summed by image, steps are blended
+  bool only_formed = false;       ///< there is no implicit product
+  bool any_lens = false;          ///< lenses of any model: implicit products are dearer, and double
+  std::uint64_t other_bytes = 0;  ///< held besides
+
+  static constexpr std::uint64_t kExactImages = 20000;
+  static constexpr std::uint64_t kAnalysedTiles = 4000000;
+};
+/// Also finds the clusters of the coarse space.
+WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
+                      Clusters& clusters, Threads& threads);
+
+/// Sets what depends on the factor of the formed matrix.
+void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& counts);
+
+/// A solver and, in one line, why it was taken.
+struct Plan {
+  SolverKind kind = SolverKind::dense;
+  std::string reason;
+  bool mixed = false;   ///< float inside the solver
+  Clusters clusters{};  ///< of an iterative solver's coarse space, as count_work finds them
+};
+
+/// Whether the solver has a variant with float inside, and whether that is the quicker one: a pure
+/// function of the kind.
+bool has_mixed(SolverKind kind);
+bool prefers_mixed(SolverKind kind);
+
+/// The cheapest by a model of flops and bytes per step: a pure function of the counts.
+Plan plan_solver(const WorkCounts& counts);
+
+/// The cheaper of the two iterative ones.
+SolverKind cheaper_iterative(const WorkCounts& counts);
+
+}  // namespace sheaf
