@@ -36,8 +36,7 @@ bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request,
                                         [](double x) { return std::isfinite(x); });
 }
 
-double CameraStage::decrease() const {
-  double sum = 0;
+double CameraStage::add_decrease(double sum) const {
   for (std::int32_t c = 0; c < columns_.count; ++c)
     sum += step_[c] * (vectors_.rhs[c] + damping_[c] * step_[c]);
   return sum;

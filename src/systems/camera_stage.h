@@ -26,8 +26,8 @@ class CameraStage {
   bool solve(const ReducedSums& sums, const StepRequest& request, const CoarseSpace* coarse,
              Step& step);
 
-  /// Twice the decrease that the linear model promises from the cameras.
-  double decrease() const;
+  /// Twice the decrease that the linear model promises: sum, of the points, and the cameras' part.
+  double add_decrease(double sum) const;
 
   const Buffer<double>& step() const { return step_; }
   const double* damping() const { return damping_.data(); }

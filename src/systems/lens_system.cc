@@ -252,13 +252,14 @@ Trial LensSystem::trial() {
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
       lens_kernels_.trial(in, chunks_.chunks[c], outputs[s]);
   });
-  double decrease = point_decrease_ + stage_.decrease(), square_sum = 0, loss_sum = 0, step2 = 0;
+  double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
   for (const TrialOutput& o : outputs) {
     square_sum += o.square_sum;
     loss_sum += o.loss_sum;
     decrease += o.damping_term;
     step2 = std::max(step2, o.step2_max);
   }
+  decrease = stage_.add_decrease(decrease);
   out.plain_cost = square_sum / 2;
   out.cost = cost_of(square_sum, loss_sum);
   trial_cost_ = out.cost;

@@ -394,16 +394,18 @@ Trial PhotometricSystem::trial() {
   const PhotometricInput patches = patches_at(held_);
   const RowTrialInput in{&rows(), kept(patches), steps_.data(), held_.points.data(),
                          factors_.data()};
-  std::vector<TrialOutput> outputs(chunks_.chunks.size(),
+  std::vector<TrialOutput> outputs(chunks_.slices.size() - 1,
                                    TrialOutput{tried_.points.data(), 0, 0, 0, 0});
-  threads_.for_each(outputs.size(), [&](std::size_t c) {
-    row_kernels_.back_substitute(in, chunks_.chunks[c], outputs[c]);
+  threads_.for_each(outputs.size(), [&](std::size_t s) {
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      row_kernels_.back_substitute(in, chunks_.chunks[c], outputs[s]);
   });
-  double decrease = point_decrease_ + stage_.decrease(), step2 = 0;
+  double decrease = point_decrease_, step2 = 0;
   for (const TrialOutput& o : outputs) {
     decrease += o.damping_term;
     step2 = std::max(step2, o.step2_max);
   }
+  decrease = stage_.add_decrease(decrease);
   tried_totals_ = collapse(tried_, nullptr);
   out.cost = tried_totals_.cost / 2;
   out.plain_cost = tried_totals_.square_sum / 2;
