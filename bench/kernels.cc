@@ -16,7 +16,7 @@
 #include "machine_peak.h"
 #include "reduced/dense_cholesky.h"
 #include "sheaf/sheaf.h"
-#include "systems/bundle_system.h"
+#include "systems/build.h"
 
 namespace {
 
@@ -181,19 +181,25 @@ void cholesky(benchmark::State& state, const Kernels* kernels) {
   report_flops(state, m * m * m / 3 + 2 * m * m);
 }
 
-BundleSystem make_system(const Problem& problem, const Batches& batches, const Kernels& kernels,
-                         Threads& threads) {
-  return BundleSystem(problem, batches, number_columns(problem, {}), PointRules{false, false, 3},
-                      {SolverKind::dense}, kernels, threads);
-}
+/// A problem set up as the solver does it.
+struct Engine {
+  SolveOptions options;
+  std::optional<Build> build;
+  std::unique_ptr<Home> home;
+
+  Engine(const Problem& problem, const Kernels& kernels, Threads& threads) {
+    options.solver = CameraSolverKind::dense;
+    build.emplace(Build::plan(problem, options, {}, kernels, threads).value());
+    home = build->make_home(problem);
+  }
+};
 
 void setup(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(1);
   for (auto _ : state) {
-    const Batches batches = arrange(problem, {}, threads);
-    BundleSystem system = make_system(problem, batches, *kernels, threads);
-    benchmark::DoNotOptimize(system.bytes());
+    const Engine engine(problem, *kernels, threads);
+    benchmark::DoNotOptimize(engine.home->bytes());
   }
 }
 
@@ -206,11 +212,10 @@ void arrange_only(benchmark::State& state) {
 void step(benchmark::State& state, const Kernels* kernels) {
   const Problem problem = load_problem();
   Threads threads(static_cast<int>(state.range(0)));
-  const Batches batches = arrange(problem, {}, threads);
-  BundleSystem system = make_system(problem, batches, *kernels, threads);
+  const Engine engine(problem, *kernels, threads);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(system.propose({1e-4}).cost);
-    benchmark::DoNotOptimize(system.trial().cost);
+    benchmark::DoNotOptimize(engine.home->propose({1e-4}).cost);
+    benchmark::DoNotOptimize(engine.home->trial().cost);
   }
 }
 

@@ -5,9 +5,13 @@
 namespace sheaf {
 
 Columns number_columns(const Problem& problem, const Fixed& fixed) {
+  return number_columns(problem, fixed, held_parameters(problem, fixed));
+}
+
+Columns number_columns(const Problem& problem, const Fixed& fixed,
+                       const std::vector<ParameterSet>& held) {
   std::vector<char> pose_held(problem.num_images(), fixed.poses);
   for (std::uint32_t i : fixed.pose_ids) pose_held[i] = true;
-  const std::vector<ParameterSet> held = held_parameters(problem, fixed);
 
   Columns out;
   out.of_image.assign(9 * problem.num_images(), Columns::kFixed);

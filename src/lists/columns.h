@@ -21,6 +21,10 @@ struct Columns {
   const std::int32_t* image(std::size_t i) const { return &of_image[9 * i]; }
 };
 
+/// held: of each camera, which of f, k1, k2 are fixed.
+Columns number_columns(const Problem& problem, const Fixed& fixed,
+                       const std::vector<ParameterSet>& held);
+/// Of a problem whose cameras are all BAL's.
 Columns number_columns(const Problem& problem, const Fixed& fixed);
 
 }  // namespace sheaf

@@ -20,10 +20,10 @@ void release(std::vector<T>& v) {
   std::vector<T>().swap(v);
 }
 
-void clear(Problem& problem) {
+void clear(Problem& problem, bool with_xy) {
   release(problem.observation_image);
   release(problem.observation_point);
-  release(problem.observation_xy);
+  if (with_xy) release(problem.observation_xy);
 }
 
 }  // namespace
@@ -41,20 +41,22 @@ bool LentObservations::possible(const Problem& p, const Batches& batches, Thread
   return sorted;
 }
 
-std::uint64_t LentObservations::bytes(const Problem& problem) {
-  return problem.num_observations() * (2 * sizeof(std::uint32_t) + 2 * sizeof(double));
+std::uint64_t LentObservations::bytes(const Problem& problem, bool with_xy) {
+  return problem.num_observations() *
+         (2 * sizeof(std::uint32_t) + (with_xy ? 2 * sizeof(double) : 0));
 }
 
-LentObservations::LentObservations(Problem& problem, const Batches& batches, Threads& threads)
-    : problem_(problem), batches_(batches), threads_(threads) {
-  clear(problem);
+LentObservations::LentObservations(Problem& problem, const Batches& batches, Threads& threads,
+                                   bool with_xy)
+    : problem_(problem), batches_(batches), threads_(threads), with_xy_(with_xy) {
+  clear(problem, with_xy);
 }
 
 LentObservations::~LentObservations() {
   try {
     put_back();
   } catch (const std::bad_alloc&) {
-    clear(problem_);
+    clear(problem_, true);
   }
 }
 
@@ -68,7 +70,7 @@ void LentObservations::put_back() {
   for (std::size_t j = 0; j < problem_.num_points(); ++j) first[j + 1] += first[j];
   problem_.observation_image.resize(batches_.observations);
   problem_.observation_point.resize(batches_.observations);
-  problem_.observation_xy.resize(2 * batches_.observations);
+  if (with_xy_) problem_.observation_xy.resize(2 * batches_.observations);
   threads_.for_ranges(batches_.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
     for (; g < end; ++g) {
       const Batches::Group& group = batches_.groups[g];
@@ -78,6 +80,7 @@ void LentObservations::put_back() {
           const std::uint64_t i = first[point] + o, b = group.first_batch + o;
           problem_.observation_image[i] = batches_.image[8 * b + l];
           problem_.observation_point[i] = point;
+          if (!with_xy_) continue;
           problem_.observation_xy[2 * i] = batches_.xy[16 * b + l];
           problem_.observation_xy[2 * i + 1] = batches_.xy[16 * b + 8 + l];
         }

@@ -18,9 +18,10 @@ class LentObservations {
  public:
   static bool possible(const Problem& problem, const Batches& batches, Threads& threads);
   /// What is given up.
-  static std::uint64_t bytes(const Problem& problem);
+  static std::uint64_t bytes(const Problem& problem, bool with_xy);
 
-  LentObservations(Problem& problem, const Batches& batches, Threads& threads);
+  /// with_xy: the batches have the problem's measurements; else these stay where they are.
+  LentObservations(Problem& problem, const Batches& batches, Threads& threads, bool with_xy = true);
   /// Where memory does not suffice for them any more, the problem stays without observations.
   ~LentObservations();
   LentObservations(const LentObservations&) = delete;
@@ -32,6 +33,7 @@ class LentObservations {
   Problem& problem_;
   const Batches& batches_;
   Threads& threads_;
+  const bool with_xy_;
 };
 
 }  // namespace sheaf

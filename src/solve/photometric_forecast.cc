@@ -112,7 +112,7 @@ Counts count(const PhotometricProblem& problem, const PhotometricOptions& option
   w.images = rays ? sample.blocks.size() : images;
   w.columns = images * ((options.fix_poses ? 0u : 6u) + (options.affine_brightness ? 2u : 0u));
   w.tiles = std::min<std::uint64_t>(w.pairs, sample.tiles.size());
-  w.pair_runs = std::min(w.pairs, w.tiles * (1 + w.batches / PhotometricSystem::kBatchesPerChunk));
+  w.pair_runs = std::min(w.pairs, w.tiles * (1 + w.batches / PixelRows::kBatchesPerChunk));
   w.sparse_doubles = w.columns * (w.columns + 1) / 2;
   c.image_tiles = rays ? sample.image_tiles.size() : 0;
   return c;

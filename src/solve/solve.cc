@@ -3,53 +3,20 @@
 #include "sheaf/solve.h"
 
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "eliminate/kernel_table.h"
-#include "lists/lent_observations.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "scene/behind.h"
 #include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
-#include "systems/bal_view.h"
-#include "systems/bundle_system.h"
-#include "systems/choose_solver.h"
-#include "systems/image_system.h"
-#include "systems/lens_system.h"
+#include "systems/build.h"
 
 namespace sheaf {
 namespace {
-
-const char* simd_name(Simd simd) {
-  switch (simd) {
-    case Simd::scalar:
-      return "scalar";
-    case Simd::sse4:
-      return "sse4";
-    case Simd::avx2:
-      return "avx2";
-    case Simd::avx512:
-      return "avx512";
-    case Simd::best:
-      break;
-  }
-  return "";
-}
-
-Result<const Kernels*> choose_kernels(Simd simd) {
-  const auto available = available_kernels();
-  if (simd == Simd::best) return available.front();
-  std::string names;
-  for (const Kernels* kernels : available) {
-    if (std::string(kernels->name) == simd_name(simd)) return kernels;
-    names += std::string(names.empty() ? "" : ", ") + kernels->name;
-  }
-  return Error(ErrorCode::usage, std::string("this machine cannot run the instruction set ") +
-                                     simd_name(simd) + "; it can run: " + names);
-}
 
 Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
@@ -87,26 +54,6 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   return {};
 }
 
-ChartBase chart_base(PointParametrisation points) {
-  switch (points) {
-    case PointParametrisation::xyz:
-      return ChartBase::none;
-    case PointParametrisation::homogeneous:
-      return ChartBase::origin;
-    case PointParametrisation::inverse_depth:
-      return ChartBase::host;
-  }
-  return ChartBase::none;
-}
-
-/// A few hundred megabytes are worth a pass over the observations at the end.
-bool lends_observations(const Problem& problem, const Batches& batches, const SolveOptions& options,
-                        Threads& threads) {
-  constexpr std::size_t kWorthLending = 4000000;
-  return options.lend_observations && problem.num_observations() >= kWorthLending &&
-         LentObservations::possible(problem, batches, threads);
-}
-
 void tell(const Choice& choice, const SolveOptions& options, const Kernels& kernels,
           const Threads& threads, Summary& summary) {
   summary.solver = to_string(choice.plan.kind);
@@ -117,34 +64,6 @@ void tell(const Choice& choice, const SolveOptions& options, const Kernels& kern
   summary.loss = options.loss.kind;
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
-}
-
-/// Refines what is set up, and stores it.
-template <class Home>
-void run(Home& system, Problem& problem, SolveOptions options, const Stopwatch& clock,
-         Summary& summary) {
-  summary.setup_s = clock.seconds();
-  if (options.initial_damping == 0) options.initial_damping = default_damping(problem.num_images());
-  minimize_in_rounds(system, options, clock, summary);
-  system.store(problem);
-}
-
-/// Points held, no lens shared: images by themselves.
-Result<void> refine_images(Problem& problem, const SolveOptions& options, const Kernels& kernels,
-                           const std::vector<std::uint8_t>& skip, Columns columns, Threads& threads,
-                           const Stopwatch& clock, Summary& summary) {
-  const Result<Choice> choice = choose_for_images(columns, count_image_batches(problem), options,
-                                                  {resident_bytes(), peak_resident_bytes()});
-  if (!choice.ok()) return choice.error();
-  tell(choice.value(), options, kernels, threads, summary);
-  ImageSystem system(problem, arrange_by_image(problem, skip), std::move(columns),
-                     options.cheirality != Cheirality::formula, image_kernels(kernels.name),
-                     threads);
-  if (system.count_behind() > 0) summary.behind_camera_before = behind_camera(problem, threads);
-  run(system, problem, options, clock, summary);
-  summary.solve_s = clock.seconds() - summary.setup_s;
-  if (system.count_behind() > 0) summary.behind_camera_after = behind_camera(problem, threads);
-  return {};
 }
 
 /// Observations to leave out: 1 for each.
@@ -158,78 +77,29 @@ std::vector<std::uint8_t> held_out(const Problem& problem, const SolveOptions& o
   return skip;
 }
 
-/// Lenses of any model.
-Result<void> refine_lenses(Problem& problem, const SolveOptions& options, const Kernels& kernels,
-                           const Stopwatch& clock, Summary& summary) {
-  const auto refused = [](const char* what) {
-    return Error(ErrorCode::usage,
-                 std::string(what) +
-                     " is for BAL, SIMPLE_PINHOLE, SIMPLE_RADIAL and RADIAL cameras with their "
-                     "principal points held");
-  };
-  if (options.trust_region == TrustRegion::dogleg) return refused("the dogleg");
-  if (options.points != PointParametrisation::xyz)
-    return refused("a parametrisation of points other than X, Y, Z");
-  Threads threads(options.threads);
-  const std::vector<std::uint8_t> skip = held_out(problem, options, threads, summary);
-  const Result<LensArrangement> arranged =
-      arrange_with_lenses(problem, options.fixed, skip, threads);
-  if (!arranged.ok()) return arranged.error();
-  Result<LensChoice> chosen = choose_for_lenses(arranged.value(), options, threads);
-  if (!chosen.ok()) return chosen.error();
-  const Choice& choice = chosen.value().choice;
-  tell(choice, options, kernels, threads, summary);
-  const LensRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
-                        options.inner_iterations};
-  LensSystem system(problem, arranged.value(), std::move(chosen.value().chunks), rules, choice.plan,
-                    kernels, threads);
-  summary.behind_camera_before = behind_camera(problem, threads);
-  run(system, problem, options, clock, summary);
-  summary.solve_s = clock.seconds() - summary.setup_s;
-  summary.behind_camera_after = behind_camera(problem, threads);
-  return {};
-}
-
-/// Arranges the problem, chooses the solver and refines; what went wrong, if anything.
-Result<void> refine(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+/// Builds a system of the problem, refines it and stores it; what went wrong, if anything.
+Result<void> refine(Problem& problem, SolveOptions options, const Kernels& kernels,
                     const Stopwatch& clock, Summary& summary) {
   Threads threads(options.threads);
   const std::vector<std::uint8_t> skip = held_out(problem, options, threads, summary);
-  Columns columns = number_columns(problem, options.fixed);
-  const bool only_images = options.fixed.points && !columns.lens_shared &&
-                           options.trust_region == TrustRegion::lm &&
-                           options.solver == CameraSolverKind::automatic;
-  if (only_images)
-    return refine_images(problem, options, kernels, skip, std::move(columns), threads, clock,
-                         summary);
-  const Batches batches = arrange(problem, skip, threads);
-  Clusters clusters;
-  WorkCounts counts = count_work(batches, columns, options.fixed.points, clusters, threads);
-  counts.weighted = options.loss.kind != LossKind::none;
-  counts.dogleg = options.trust_region == TrustRegion::dogleg;
-  const bool lends = lends_observations(problem, batches, options, threads);
-  const std::uint64_t lent_bytes = lends ? LentObservations::bytes(problem) : 0;
-  Result<Choice> choice = choose_solver(counts, options, threads.count(),
-                                        {resident_bytes() - lent_bytes, peak_resident_bytes()});
-  if (!choice.ok()) return choice.error();
-  choice.value().plan.clusters = std::move(clusters);
-  tell(choice.value(), options, kernels, threads, summary);
-
+  Result<Build> planned = Build::plan(problem, options, skip, kernels, threads);
+  if (!planned.ok()) return planned.error();
+  Build& build = planned.value();
+  tell(build.choice(), options, kernels, threads, summary);
   bool behind_after = false;
   {
+    if (build.lends()) summary.behind_camera_before = behind_camera(problem, threads);
     std::optional<LentObservations> lent;
-    if (lends) {
+    if (build.lends()) build.lend(problem, lent);
+    const std::unique_ptr<Home> home = build.make_home(problem);
+    if (!build.lends() && home->count_behind() > 0)
       summary.behind_camera_before = behind_camera(problem, threads);
-      lent.emplace(problem, batches, threads);
-    }
-    const PointRules rules{options.fixed.points, options.cheirality != Cheirality::formula,
-                           options.inner_iterations, chart_base(options.points)};
-    BundleSystem system(problem, batches, std::move(columns), rules, choice.value().plan, kernels,
-                        threads);
-    if (!lends && system.count_behind() > 0)
-      summary.behind_camera_before = behind_camera(problem, threads);
-    run(system, problem, options, clock, summary);
-    behind_after = system.count_behind() > 0;
+    summary.setup_s = clock.seconds();
+    if (options.initial_damping == 0)
+      options.initial_damping = default_damping(problem.num_images());
+    minimize_in_rounds(*home, options, clock, summary);
+    build.store(*home, problem);
+    behind_after = home->count_behind() > 0;
   }
   summary.solve_s = clock.seconds() - summary.setup_s;
   if (behind_after) summary.behind_camera_after = behind_camera(problem, threads);
@@ -250,14 +120,7 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   try {
-    Result<void> done;
-    if (BalView::serves(problem, options.fixed)) {
-      SolveOptions resolved = options;
-      const BalView view(problem, resolved.fixed);
-      done = refine(problem, resolved, *kernels.value(), clock, summary);
-    } else {
-      done = refine_lenses(problem, options, *kernels.value(), clock, summary);
-    }
+    const Result<void> done = refine(problem, options, *kernels.value(), clock, summary);
     if (!done.ok()) return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");

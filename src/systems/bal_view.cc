@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "systems/bal_view.h"
 
+#include <algorithm>
+
 #include "geometry/camera_model.h"
-#include "scene/camera_frame.h"
+#include "platform/parallel.h"
 
 namespace sheaf {
 
@@ -17,44 +19,90 @@ bool BalView::serves(const Problem& problem, const Fixed& fixed) {
   return true;
 }
 
-BalView::BalView(Problem& problem, Fixed& fixed) : problem_(problem) {
-  if (has_only_bal_cameras(problem)) return;
-  cameras_ = problem.cameras;
-  xy_ = problem.observation_xy;
-  std::vector<ParameterSet> held = held_parameters(problem, fixed);
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    const ParameterRoles role = roles_of(cameras_[c].model);
+BalView::BalView(const Problem& problem, const Fixed& fixed)
+    : turns_(!has_only_bal_cameras(problem)), held_(held_parameters(problem, fixed)) {
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    views_.push_back(*radial_view(problem.cameras[c]));
+    const ParameterRoles role = roles_of(problem.cameras[c].model);
     ParameterSet of_bal = 0;
     int to = 0;
     for (int from : {role.fx, role.k1, role.k2}) {
-      const bool free = from >= 0 && (held[c] >> from & 1) == 0;
+      const bool free = from >= 0 && (held_[c] >> from & 1) == 0;
       of_bal = static_cast<ParameterSet>(of_bal | (free ? 0 : 1) << to++);
     }
-    held[c] = of_bal;
+    held_[c] = of_bal;
   }
-  turned_ = to_bal_cameras(problem).ok();
-  if (turned_) fixed.parameters = std::move(held);
 }
 
-BalView::~BalView() {
-  if (!turned_) return;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    Camera& camera = cameras_[c];
-    const auto& refined = problem_.cameras[c].parameters;
+bool BalView::turns(const Problem& problem, std::size_t image) const {
+  return problem.cameras[problem.image_camera[image]].model != CameraModel::bal;
+}
+
+CameraState BalView::cameras(const Problem& problem) const {
+  CameraState out;
+  out.poses.reserve(problem.num_images());
+  for (std::size_t i = 0; i < problem.num_images(); ++i) {
+    Pose pose = problem.poses[i];
+    if (turns(problem, i)) turn_round(pose, false);
+    out.poses.push_back({pose.rotation, pose.translation});
+  }
+  for (const RadialView& view : views_) out.sets.push_back({view.f, view.k1, view.k2});
+  return out;
+}
+
+void BalView::turn(const Problem& problem, Batches& batches, Threads& threads) const {
+  if (!turns_) return;
+  constexpr std::size_t kBatches = 8192;
+  threads.for_ranges(batches.num_batches(), kBatches, [&](std::size_t b, std::size_t end) {
+    for (; b < end; ++b)
+      for (std::size_t l = 0; l < 8; ++l) {
+        const std::uint32_t image = batches.image[8 * b + l];
+        if (!turns(problem, image)) continue;
+        const RadialView& view = views_[problem.image_camera[image]];
+        double* xy = &batches.xy[16 * b + l];
+        xy[0] -= view.cx;
+        xy[8] = view.cy - xy[8];
+      }
+  });
+}
+
+void BalView::turn(const Problem& problem, ImageBatches& batches, Threads& threads) const {
+  if (!turns_) return;
+  constexpr std::size_t kPieces = 64;
+  threads.for_ranges(batches.pieces.size(), kPieces, [&](std::size_t p, std::size_t end) {
+    for (; p < end; ++p) {
+      const ImageBatches::Piece& piece = batches.pieces[p];
+      if (!turns(problem, piece.image)) continue;
+      const RadialView& view = views_[problem.image_camera[piece.image]];
+      for (std::uint64_t b = piece.first_batch; b < piece.first_batch + piece.batches; ++b) {
+        double* xy = &batches.rows[ImageBatches::kBatchDoubles * b + 24];
+        for (std::size_t l = 0; l < 8; ++l) {
+          xy[l] -= view.cx;
+          xy[8 + l] = view.cy - xy[8 + l];
+        }
+      }
+    }
+  });
+}
+
+void BalView::store(const CameraState& cameras, Problem& problem) const {
+  for (std::size_t i = 0; i < problem.num_images(); ++i) {
+    Pose& pose = problem.poses[i];
+    pose.rotation = cameras.poses[i].rotation;
+    pose.translation = cameras.poses[i].translation;
+    if (turns(problem, i)) turn_round(pose, true);
+  }
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    Camera& camera = problem.cameras[c];
+    const CameraState::Parameters& refined = cameras.sets[c];
     if (camera.model == CameraModel::bal) {
-      camera.parameters = refined;
+      std::copy_n(refined.begin(), 3, camera.parameters.begin());
       continue;
     }
     camera.parameters[0] = refined[0];
-    const RadialView view = *radial_view(camera);
-    if (view.has_k1) camera.parameters[3] = refined[1];
-    if (view.has_k2) camera.parameters[4] = refined[2];
+    if (views_[c].has_k1) camera.parameters[3] = refined[1];
+    if (views_[c].has_k2) camera.parameters[4] = refined[2];
   }
-  problem_.cameras = std::move(cameras_);
-  problem_.observation_xy = std::move(xy_);
-  for (std::size_t j = 0; j < problem_.num_images(); ++j)
-    if (problem_.cameras[problem_.image_camera[j]].model != CameraModel::bal)
-      turn_round(problem_.poses[j], true);
 }
 
 }  // namespace sheaf

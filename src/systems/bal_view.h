@@ -2,32 +2,46 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <optional>
+#include <cstdint>
 #include <vector>
 
+#include "lists/batches.h"
+#include "lists/image_batches.h"
+#include "scene/camera_frame.h"
 #include "sheaf/problem.h"
+#include "systems/camera_state.h"
 
 namespace sheaf {
 
-/// While it lives, the problem's cameras are BAL ones, which is what the kernels know; afterwards
-/// they are of their own models again, with what was refined. Exact: only measurements are rounded
-/// meanwhile (by the principal point), and those come back as they were.
+/// A problem whose cameras BAL's formula describes, as the kernels know it: y and z of the cameras
+/// turned round, pixels from the principal point, f, k1 and k2 the only parameters. The problem
+/// itself is not touched. Exact: only measurements are rounded (by the principal point), and they
+/// are not written back.
 class BalView {
  public:
   /// Whether BAL's formula describes all cameras and what is to be refined of them.
   static bool serves(const Problem& problem, const Fixed& fixed);
-  /// The problem must be one that it serves. Sets Fixed::parameters to what is held of the BAL
-  /// cameras: what the models do not have too.
-  BalView(Problem& problem, Fixed& fixed);
-  ~BalView();
-  BalView(const BalView&) = delete;
-  BalView& operator=(const BalView&) = delete;
+  /// The problem must be one that it serves.
+  BalView(const Problem& problem, const Fixed& fixed);
+
+  /// Whether any camera is of another model, so that measurements differ from the problem's.
+  bool turns() const { return turns_; }
+  /// What is held of each camera's f, k1 and k2: what its model does not have too.
+  const std::vector<ParameterSet>& held() const { return held_; }
+  /// The poses turned, and f, k1, k2 of each camera.
+  CameraState cameras(const Problem& problem) const;
+  /// Measurements as they were arranged, from the problem's to the view's.
+  void turn(const Problem& problem, Batches& batches, Threads& threads) const;
+  void turn(const Problem& problem, ImageBatches& batches, Threads& threads) const;
+  /// What was refined, back into the problem's own models.
+  void store(const CameraState& cameras, Problem& problem) const;
 
  private:
-  Problem& problem_;
-  bool turned_ = false;
-  std::vector<Camera> cameras_;  ///< as they were
-  std::vector<double> xy_;
+  bool turns(const Problem& problem, std::size_t image) const;
+
+  bool turns_ = false;
+  std::vector<RadialView> views_;  ///< of each camera
+  std::vector<ParameterSet> held_;
 };
 
 }  // namespace sheaf

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "eliminate/kernels.h"
+
 namespace sheaf {
 
-CameraStage::CameraStage(const Columns& columns) : columns_(columns) {
+CameraStage::CameraStage(const Columns& columns, const Reduction& reduction)
+    : columns_(columns), reduction_(reduction) {
   const std::size_t padded = (static_cast<std::size_t>(columns.count) + 7) / 8 * 8;
   damping_.allocate(padded);
   step_.allocate(padded);
@@ -21,25 +24,84 @@ double CameraStage::gather(const ReducedSums& sums, double lambda) {
     damping_[c] = lambda * square;
     gradient = std::max(gradient, std::abs(vectors_.rhs[c]) / std::sqrt(square));
   }
+  reduction_.max(&gradient, 1);
   return gradient;
 }
 
-bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request,
-                        const CoarseSpace* coarse, Step& step) {
+CameraSystem CameraStage::system(const ReducedSums& sums, const StepRequest& request) const {
+  return {sums,
+          &vectors_,
+          damping_.data(),
+          request.forcing,
+          request.cancelled,
+          corrected_ ? coarse_.get() : nullptr,
+          request.precise,
+          request.radius,
+          request.damping,
+          request.dogleg};
+}
+
+bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request, Step& step) {
+  residual_ = nullptr;
+  cut_ = false;
   if (columns_.count == 0) return true;
-  const CameraSystem system{
-      sums,   &vectors_,      damping_.data(), request.forcing, request.cancelled,
-      coarse, request.precise};
-  const CameraSolution solution = solver_->solve(system, step_);
+  corrected_ = coarse_ && coarse_->factor(sums.diagonal, damping_.data());
+  const CameraSolution solution = solver_->solve(system(sums, request), step_);
+  ++solves_;
   step.linear_iterations = solution.iterations;
+  if (coarse_) coarse_->solved(solution.iterations);
+  residual_ = solution.residual;
+  cut_ = solution.cut;
   return solution.solved && std::all_of(step_.begin(), step_.begin() + columns_.count,
                                         [](double x) { return std::isfinite(x); });
+}
+
+bool CameraStage::shorten(const ReducedSums& sums, const StepRequest& request) {
+  const double radius = request.radius;
+  if (residual_ == nullptr || !(add_damping(0) > radius * radius * request.damping)) return false;
+  const CameraSolution solution = solver_->shorten(system(sums, request), step_);
+  if (!solution.solved) return false;
+  residual_ = solution.residual;
+  cut_ = true;
+  return true;
+}
+
+void CameraStage::moved(double cost) {
+  if (coarse_) coarse_->moved(cost);
 }
 
 double CameraStage::add_decrease(double sum) const {
   for (std::int32_t c = 0; c < columns_.count; ++c)
     sum += step_[c] * (vectors_.rhs[c] + damping_[c] * step_[c]);
   return sum;
+}
+
+double CameraStage::add_damping(double sum) const {
+  for (std::int32_t c = 0; c < columns_.count; ++c) sum += step_[c] * damping_[c] * step_[c];
+  return sum;
+}
+
+double CameraStage::add_promise(double sum) const {
+  for (std::int32_t c = 0; c < columns_.count; ++c) sum += step_[c] * vectors_.rhs[c];
+  return sum;
+}
+
+double CameraStage::dot(const Buffer<double>& a, const double* b) const {
+  double sum = 0;
+  for (std::int32_t c = 0; b != nullptr && c < columns_.count; ++c) sum += a[c] * b[c];
+  return sum;
+}
+
+const Buffer<double>& CameraStage::blend(double newton, double descent,
+                                         const Buffer<double>& direction) {
+  if (blended_.size() == 0) blended_.allocate(step_.size());
+  for (std::int32_t c = 0; c < columns_.count; ++c)
+    blended_[c] = newton * step_[c] + descent * direction[c];
+  return blended_;
+}
+
+std::uint64_t CameraStage::bytes() const {
+  return solver_->bytes() + (coarse_ ? coarse_->bytes() : 0);
 }
 
 }  // namespace sheaf

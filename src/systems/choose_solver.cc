@@ -115,7 +115,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
           : "");
 }
 
-Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const SolveOptions& options,
+Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOptions& options,
                                      Threads& threads) {
   const bool held = options.fixed.points;
   Clusters clusters;

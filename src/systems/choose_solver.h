@@ -7,7 +7,7 @@
 
 #include "sheaf/error.h"
 #include "sheaf/options.h"
-#include "systems/lens_system.h"
+#include "systems/arrangement.h"
 #include "systems/plan.h"
 
 namespace sheaf {
@@ -39,7 +39,7 @@ struct LensChoice {
   Choice choice;
   LensChunks chunks;
 };
-Result<LensChoice> choose_for_lenses(const LensArrangement& arranged, const SolveOptions& options,
+Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOptions& options,
                                      Threads& threads);
 
 }  // namespace sheaf

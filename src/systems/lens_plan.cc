@@ -19,7 +19,7 @@ struct LensColumns {
 
 }  // namespace
 
-WorkCounts estimate_lens_work(const LensArrangement& arranged, bool points_held, Clusters& clusters,
+WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clusters& clusters,
                               Threads& threads) {
   const LensTracks& tracks = arranged.tracks;
   WorkCounts c = count_work(arranged.batches, image_columns(tracks, arranged.columns, true),
@@ -42,7 +42,7 @@ WorkCounts estimate_lens_work(const LensArrangement& arranged, bool points_held,
   return c;
 }
 
-WorkCounts count_lens_work(const LensArrangement& arranged, const LensChunks& lists,
+WorkCounts count_lens_work(const Arrangement& arranged, const LensChunks& lists,
                            const WorkCounts& estimate) {
   WorkCounts c = estimate;
   const Chunks &chunks = lists.chunks, &slots = lists.slots;

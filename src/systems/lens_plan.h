@@ -4,19 +4,19 @@
 
 #include <cstdint>
 
-#include "systems/lens_system.h"
+#include "systems/arrangement.h"
 #include "systems/plan.h"
 
 namespace sheaf {
 
 /// As count_work, before anything is listed: images alone are counted exactly, what lenses add to
 /// the factor of a formed matrix is estimated.
-WorkCounts estimate_lens_work(const LensArrangement& arranged, bool points_held, Clusters& clusters,
+WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clusters& clusters,
                               Threads& threads);
 
 /// As it is once pairs are listed: blocks of images and of lenses alike count as images. clusters:
 /// as estimated.
-WorkCounts count_lens_work(const LensArrangement& arranged, const LensChunks& chunks,
+WorkCounts count_lens_work(const Arrangement& arranged, const LensChunks& chunks,
                            const WorkCounts& estimate);
 
 /// What the lists of pairs hold, which forecasts count once more.

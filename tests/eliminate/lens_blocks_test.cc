@@ -16,7 +16,7 @@
 #include "io/models.h"
 #include "lists/lens_chunks.h"
 #include "platform/parallel.h"
-#include "systems/lens_system.h"
+#include "systems/arrangement.h"
 
 namespace sheaf {
 namespace {
@@ -30,9 +30,9 @@ class Linearized {
   Linearized(const Problem& problem, const Kernels& kernels, LensLists lists,
              const ScaledLoss& loss) {
     Threads alone(1);
-    const Result<LensArrangement> made = arrange_with_lenses(
+    const Result<Arrangement> made = arrange_with_lenses(
         problem, {}, std::vector<std::uint8_t>(problem.num_observations(), 0), alone);
-    const LensArrangement& arranged = made.value();
+    const Arrangement& arranged = made.value();
     const Batches& batches = arranged.batches;
     const LensTracks& tracks = arranged.tracks;
     const LensChunks chunks = cut_lens_chunks(batches, tracks, lists, alone);

@@ -1,0 +1,69 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "eliminate/kernels.h"
+#include "lists/image_batches.h"
+#include "lists/lent_observations.h"
+#include "platform/parallel.h"
+#include "sheaf/options.h"
+#include "systems/arrangement.h"
+#include "systems/bal_view.h"
+#include "systems/choose_solver.h"
+#include "systems/home.h"
+
+namespace sheaf {
+
+/// From a problem and options to a System, in one place: which home, how observations are arranged,
+/// which camera solver. The problem is read and not touched until store(), but for its
+/// observations where these are lent.
+class Build {
+ public:
+  /// Arranges the problem and chooses the solver; nothing of that is allocated yet. skip: 1 for
+  /// each observation to leave out, or empty. Errors: usage, what cannot be solved so;
+  /// memory_limit.
+  static Result<Build> plan(const Problem& problem, const SolveOptions& options,
+                            const std::vector<std::uint8_t>& skip, const Kernels& kernels,
+                            Threads& threads);
+
+  const Choice& choice() const { return choice_; }
+  /// Whether the problem's observations are to be lent while home() lives.
+  bool lends() const { return lends_; }
+  /// Frees the problem's observations until `lent` goes, which must outlive neither of them.
+  void lend(Problem& problem, std::optional<LentObservations>& lent) const;
+
+  /// The home, which the Build must outlive. Throws std::bad_alloc.
+  std::unique_ptr<Home> make_home(const Problem& problem);
+  /// Writes the home's held state into the problem.
+  void store(const Home& home, Problem& problem) const;
+
+ private:
+  Build(const SolveOptions& options, const Kernels& kernels, Threads& threads);
+  Result<void> plan_bal(const Problem& problem, const std::vector<std::uint8_t>& skip);
+  Result<void> plan_images(const Problem& problem, const std::vector<std::uint8_t>& skip,
+                           Columns columns);
+  Result<void> plan_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
+                           Columns columns);
+  Result<void> plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip);
+  CameraState cameras(const Problem& problem) const;
+  bool watches_behind() const { return options_->cheirality != Cheirality::formula; }
+
+  const SolveOptions* options_;
+  const Kernels* kernels_;
+  Threads* threads_;
+  std::optional<BalView> view_;           ///< of lenses that BAL's formula describes
+  std::optional<ImageBatches> by_image_;  ///< points held and no lens shared
+  std::unique_ptr<Arrangement> arranged_;
+  Choice choice_;
+  bool lends_ = false;
+};
+
+/// The kernels of an instruction set. Errors: usage, this machine cannot run it.
+Result<const Kernels*> choose_kernels(Simd simd);
+
+}  // namespace sheaf

@@ -1,0 +1,120 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "systems/camera_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "geometry/camera_model.h"
+
+namespace sheaf {
+namespace {
+
+double norm(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
+
+}  // namespace
+
+CameraState camera_state(const Problem& problem) {
+  CameraState out;
+  out.poses.reserve(problem.num_images());
+  for (const Pose& pose : problem.poses) out.poses.push_back({pose.rotation, pose.translation});
+  out.sets.reserve(problem.cameras.size());
+  for (const Camera& camera : problem.cameras) out.sets.push_back(camera.parameters);
+  return out;
+}
+
+void store(const CameraState& state, Problem& problem) {
+  for (std::size_t i = 0; i < state.poses.size(); ++i) {
+    problem.poses[i].rotation = state.poses[i].rotation;
+    problem.poses[i].translation = state.poses[i].translation;
+  }
+  for (std::size_t c = 0; c < state.sets.size(); ++c) problem.cameras[c].parameters = state.sets[c];
+}
+
+CameraColumns::CameraColumns(const Columns& columns, std::size_t images) : poses_(images) {
+  for (std::size_t i = 0; i < images; ++i) std::copy_n(columns.image(i), 6, poses_[i].begin());
+}
+
+void CameraColumns::add(Parameter parameter) {
+  if (parameter.column >= 0) parameters_.push_back(parameter);
+}
+
+CameraColumns CameraColumns::of_bal(const Columns& columns,
+                                    const std::vector<std::uint32_t>& image_camera) {
+  CameraColumns out(columns, columns.num_images());
+  std::vector<char> seen;
+  for (std::size_t i = 0; i < columns.num_images(); ++i) {
+    const std::uint32_t lens = image_camera[i];
+    if (seen.size() <= lens) seen.resize(lens + std::size_t(1), false);
+    if (std::exchange(seen[lens], true)) continue;
+    const std::int32_t* c = columns.image(i) + 6;
+    out.add({lens, 0, 0, 1, c[0]});
+    for (std::uint8_t k : {1, 2}) out.add({lens, k, Parameter::kNone, 1, c[k]});
+  }
+  return out;
+}
+
+/// Lengths in pixels change relative to the focal length.
+CameraColumns CameraColumns::of_lenses(const Columns& columns, const LensTracks& tracks) {
+  CameraColumns out(columns, tracks.image_lens.size());
+  std::vector<char> seen(tracks.lenses.size(), false);
+  for (std::size_t i = 0; i < tracks.image_lens.size(); ++i) {
+    const std::uint32_t lens = tracks.image_lens[i];
+    if (std::exchange(seen[lens], true)) continue;
+    const LensPlaces& places = tracks.lenses[lens];
+    const ParameterRoles roles = roles_of(places.model);
+    for (std::size_t p = 0; p < places.place.size(); ++p) {
+      const int place = places.place[p], index = static_cast<int>(p);
+      if (place < 0) continue;
+      const std::int32_t* c = columns.image(i) + 6 + place;
+      if (place >= LensPlaces::kRiders)
+        c = columns.image(places.first_block) + (place - LensPlaces::kRiders);
+      const bool length =
+          index == roles.fx || index == roles.fy || index == roles.cx || index == roles.cy;
+      out.add({lens, static_cast<std::uint8_t>(p),
+               static_cast<std::int8_t>(length ? roles.fx : Parameter::kNone), 1, *c});
+    }
+  }
+  return out;
+}
+
+CameraColumns CameraColumns::of_brightness(const Columns& columns) {
+  CameraColumns out(columns, columns.num_images());
+  for (std::size_t i = 0; i < columns.num_images(); ++i) {
+    const std::int32_t* c = columns.image(i) + 6;
+    out.add({static_cast<std::uint32_t>(i), 0, Parameter::kNone, 1, c[0]});
+    out.add({static_cast<std::uint32_t>(i), 1, Parameter::kNone, 255, c[1]});
+  }
+  return out;
+}
+
+double CameraColumns::step(const CameraState& from, const Buffer<double>& x,
+                           CameraState& to) const {
+  double largest = 0;
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const std::array<std::int32_t, 6>& c = poses_[i];
+    const RigidMotion<double>& pose = from.poses[i];
+    to.poses[i] = pose;
+    if (c[0] < 0) continue;
+    std::array<double, 6> d;
+    for (std::size_t k = 0; k < 6; ++k) d[k] = x[static_cast<std::size_t>(c[k])];
+    to.poses[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
+    const auto& t = pose.translation;
+    largest = std::max({largest, norm(d[3], d[4], d[5]),
+                        norm(d[0], d[1], d[2]) / (norm(t[0], t[1], t[2]) + 1e-300)});
+  }
+  to.sets = from.sets;
+  for (const Parameter& p : parameters_) {
+    const double change = x[static_cast<std::size_t>(p.column)];
+    const CameraState::Parameters& held = from.sets[p.set];
+    const double unit = p.relative_to >= 0
+                            ? std::abs(held[static_cast<std::size_t>(p.relative_to)]) + 1e-300
+                            : p.unit;
+    to.sets[p.set][p.index] = held[p.index] + change;
+    largest = std::max(largest, std::abs(change) / unit);
+  }
+  return largest;
+}
+
+}  // namespace sheaf

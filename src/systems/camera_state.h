@@ -1,0 +1,67 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "geometry/rigid_motion.h"
+#include "lists/columns.h"
+#include "lists/lens_tracks.h"
+#include "platform/buffer.h"
+#include "sheaf/problem.h"
+
+namespace sheaf {
+
+/// The camera side of a state: a pose for each image and, beside them, sets of parameters: one for
+/// each lens, or each image's brightness.
+struct CameraState {
+  using Parameters = std::array<double, kMaxCameraParameters>;
+  std::vector<RigidMotion<double>> poses;
+  std::vector<Parameters> sets;
+};
+
+/// The poses and lenses of a problem.
+CameraState camera_state(const Problem& problem);
+/// Writes poses and lenses back.
+void store(const CameraState& state, Problem& problem);
+
+/// Which solved columns step which part of a camera state.
+class CameraColumns {
+ public:
+  /// A free parameter. Its changes count relative to |relative_to|, a parameter of the same set, or
+  /// to `unit` where there is none.
+  struct Parameter {
+    static constexpr std::int8_t kNone = -1;
+    std::uint32_t set;
+    std::uint8_t index;
+    std::int8_t relative_to = kNone;
+    double unit = 1;
+    std::int32_t column;
+  };
+
+  /// BAL lenses: f, k1, k2 are the first three parameters of an image's lens.
+  static CameraColumns of_bal(const Columns& columns,
+                              const std::vector<std::uint32_t>& image_camera);
+  /// Lenses of any model.
+  static CameraColumns of_lenses(const Columns& columns, const LensTracks& tracks);
+  /// Brightness a and b of each image: columns 6 and 7 of its block. b counts in grey levels of
+  /// 255.
+  static CameraColumns of_brightness(const Columns& columns);
+
+  /// to = from, stepped by x. Returns the largest relative change of any one block: radians for
+  /// rotations, relative to its length for translations, parameters as said above.
+  double step(const CameraState& from, const Buffer<double>& x, CameraState& to) const;
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+
+ private:
+  CameraColumns(const Columns& columns, std::size_t images);
+  void add(Parameter parameter);
+
+  std::vector<std::array<std::int32_t, 6>> poses_;  ///< of each image; all are fixed, or none
+  std::vector<Parameter> parameters_;
+};
+
+}  // namespace sheaf

@@ -1,0 +1,26 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "systems/camera_state.h"
+#include "systems/system.h"
+
+namespace sheaf {
+
+/// A System whose state is a problem's: what the loop does not ask for, but those who built it do.
+class Home : public System {
+ public:
+  /// The held cameras, as the home knows them.
+  virtual const CameraState& cameras() const = 0;
+  /// Writes the held points, 3 numbers for each; those that nothing sees are not touched.
+  virtual void store_points(std::vector<double>& points) const = 0;
+  /// Observations behind their camera at the held state, or as many as there may be.
+  virtual std::uint64_t count_behind() = 0;
+  /// What it holds beside its arrangement.
+  virtual std::uint64_t bytes() const = 0;
+};
+
+}  // namespace sheaf

@@ -1,0 +1,150 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "systems/lens_rows.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "geometry/camera_model.h"
+#include "systems/lens_implicit.h"
+#include "systems/residual_quantile.h"
+
+namespace sheaf {
+
+LensRows::LensRows(const Arrangement& arrangement, const Kernels& kernels, Threads& threads)
+    : arranged_(arrangement),
+      chunks_(arrangement.lists.chunks),
+      kernels_(kernels),
+      lens_kernels_(lens_kernels(kernels.name)),
+      threads_(threads),
+      poses_alone_(std::all_of(arrangement.tracks.lenses.begin(), arrangement.tracks.lenses.end(),
+                               [](const LensPlaces& lens) { return lens.riders == 0; })),
+      layout_(arrangement.batches, arrangement.tracks, chunks_, arrangement.lists.tiles),
+      columns_(CameraColumns::of_lenses(arrangement.columns, arrangement.tracks)) {
+  for (LensCameras* records : {&held_, &tried_}) {
+    records->images.allocate(kLensStateRecord * arrangement.tracks.image_lens.size());
+    records->lenses.allocate(kLensStateRecord * arrangement.tracks.lenses.size());
+  }
+}
+
+void LensRows::attach(const SteppedState& state) {
+  state_ = &state;
+  write_records(state.held.cameras, held_);
+}
+
+void LensRows::write_records(const CameraState& cameras, LensCameras& records) const {
+  for (std::size_t i = 0; i < cameras.poses.size(); ++i) {
+    double* record = &records.images[kLensStateRecord * i];
+    const Matrix3<double> R = matrix_from_quaternion(cameras.poses[i].rotation);
+    const auto& t = cameras.poses[i].translation;
+    std::copy(R.begin(), R.end(), record);
+    std::copy(t.begin(), t.end(), record + 9);
+    std::fill(record + lens_record::kPoseStep, record + kLensStateRecord, 0.0);
+  }
+  for (std::size_t c = 0; c < cameras.sets.size(); ++c) {
+    double* record = &records.lenses[kLensStateRecord * c];
+    std::copy(cameras.sets[c].begin(), cameras.sets[c].end(), record);
+    std::fill(record + lens_record::kParameterStep, record + kLensStateRecord, 0.0);
+  }
+}
+
+LensInput LensRows::held_input() const {
+  return {&arranged_.batches, &arranged_.tracks, view(held_, state_->held)};
+}
+
+Records LensRows::eliminate(const Elimination& of, std::uint32_t c, double* scratch, double* tiles,
+                            double* diagonal, EliminateOutput& out) {
+  const LensEliminateInput in{held_input(), of.damping, of.points_held, of.loss};
+  const LensChunks& lists = arranged_.lists;
+  const Chunk& chunk = chunks_.chunks[c];
+  const LensRecords records = layout_.in(scratch);
+  lens_kernels_.linearize(in, chunk, records, out);
+  kernels_.diagonal(arranged_.batches, chunks_, chunk, records.image, diagonal);
+  (poses_alone_ ? lens_kernels_.pose_pairs : kernels_.pairs)(chunks_, chunk, records.image, tiles);
+  kernels_.pairs(lists.slots, lists.slots.chunks[c], records.image, tiles);
+  lens_kernels_.products(arranged_.tracks, lists.tiles, chunks_, chunk, records, diagonal, tiles);
+  return records.image;
+}
+
+void LensRows::step(const Buffer<double>& columns) {
+  const std::size_t images = state_->held.cameras.poses.size();
+  for (std::size_t i = 0; i < images; ++i) {
+    const std::int32_t* c = arranged_.columns.image(i);
+    if (c[0] < 0) continue;
+    double* to = &held_.images[kLensStateRecord * i + lens_record::kPoseStep];
+    for (std::size_t k = 0; k < 6; ++k) to[k] = columns[static_cast<std::size_t>(c[k])];
+  }
+  for (const CameraColumns::Parameter& p : columns_.parameters())
+    held_.lenses[kLensStateRecord * p.set + lens_record::kParameterStep + p.index] =
+        columns[static_cast<std::size_t>(p.column)];
+  write_records(state_->tried.cameras, tried_);
+}
+
+void LensRows::trial(const PointTrial& of, std::uint32_t chunk, TrialOutput& out) {
+  const LensTrialInput in{&arranged_.batches,
+                          &arranged_.tracks,
+                          view(held_, state_->held),
+                          view(tried_, state_->tried),
+                          state_->factors.data(),
+                          of.inner_iterations,
+                          of.mean_square,
+                          of.loss,
+                          state_->weights.data()};
+  lens_kernels_.trial(in, chunks_.chunks[chunk], out);
+}
+
+Costs LensRows::tried_costs(const PointTrial& in, const Costs& summed, Trial& out) {
+  if (in.watch_behind) out.newly_behind = count_newly_unseen();
+  return summed;
+}
+
+bool LensRows::sees(const LensCameras& records, const PointState& state, std::uint64_t batch,
+                    std::uint32_t lane, std::size_t group) const {
+  const std::size_t at = 8 * batch + lane;
+  const double* pose = &records.images[kLensStateRecord * arranged_.batches.image[at]];
+  const double* X = &state.points[kPointGroup * group + lane];
+  const std::uint32_t lens = arranged_.tracks.lens[at];
+  double P[3];
+  for (int i = 0; i < 3; ++i)
+    P[i] = pose[3 * i] * X[0] + pose[3 * i + 1] * X[8] + pose[3 * i + 2] * X[16] + pose[9 + i];
+  return with_lens(arranged_.tracks.lenses[lens].model,
+                   [&](auto model) { return model.sees(state.cameras.sets[lens].data(), P); });
+}
+
+std::uint64_t LensRows::count_newly_unseen() const {
+  const Batches& batches = arranged_.batches;
+  std::vector<std::uint64_t> counts(chunks_.slices.size() - 1, 0);
+  threads_.for_each(counts.size(), [&](std::size_t s) {
+    for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
+      for (std::uint32_t g = chunks_.chunks[c].first_group; g < chunks_.chunks[c].end_group; ++g) {
+        const Batches::Group& group = batches.groups[g];
+        for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+          for (std::uint32_t l = 0; l < group.lanes; ++l)
+            counts[s] +=
+                !sees(tried_, state_->tried, b, l, g) && sees(held_, state_->held, b, l, g);
+      }
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
+}
+
+double LensRows::residual_scale(double quantile) const {
+  return residual_quantile(
+      arranged_.batches, chunks_, quantile, threads_,
+      [&](const Chunk& chunk, double* out) { lens_kernels_.residuals(held_input(), chunk, out); });
+}
+
+std::unique_ptr<CameraSolver> LensRows::make_implicit(const Columns& columns, bool) {
+  return make_lens_implicit_solver(
+      columns, chunks_,
+      [this] {
+        return LensProductInput{held_input(), state_->factors.data(), state_->weights.data()};
+      },
+      lens_kernels_, threads_);
+}
+
+std::uint64_t LensRows::bytes() const {
+  return held_.images.bytes() + held_.lenses.bytes() + tried_.images.bytes() +
+         tried_.lenses.bytes();
+}
+
+}  // namespace sheaf

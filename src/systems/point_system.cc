@@ -1,0 +1,262 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "systems/point_system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lists/slices.h"
+#include "reduced/scaling.h"
+
+namespace sheaf {
+namespace {
+
+constexpr std::size_t kGroupsPerTask = 1024;
+/// Of the units that the linear system's products with points are computed in.
+constexpr double kRounding = 1.1e-16, kFloatRounding = 6e-8;
+
+}  // namespace
+
+std::unique_ptr<DoglegPasses> PointRows::make_dogleg(const Columns&, bool) { return {}; }
+
+PointSystem::PointSystem(std::unique_ptr<PointRows> rows, Start start, const Numbering& columns,
+                         const PointRules& rules, const Plan& plan, const Kernels& kernels,
+                         Threads& threads)
+    : rows_(std::move(rows)),
+      columns_(*columns.columns),
+      camera_columns_(std::move(start.camera_columns)),
+      rules_(rules),
+      float_products_(plan.mixed && plan.kind == SolverKind::implicit_cg),
+      threads_(threads),
+      stage_(columns_) {
+  state_.held.cameras = std::move(start.cameras);
+  state_.tried.cameras = state_.held.cameras;
+  fill_points(*start.points);
+  rows_->attach(state_);
+  place_charts();
+  state_.factors.allocate(kFactorGroup * rows_->batches().groups.size());
+  tiles_.allocate(num_slices() * kTileDoubles * rows_->chunks().tiles.size());
+  diagonal_.allocate(num_slices() * kDiagonalDoubles * rows_->num_blocks());
+  scratch_.resize(static_cast<std::size_t>(threads.count()));
+  set_solver(plan, columns, kernels);
+}
+
+void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const Kernels& kernels) {
+  const bool iterates =
+      plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
+  if (iterates && !rules_.held && plan.clusters.count > 0)
+    stage_.set_coarse(std::make_unique<CoarseSpace>(
+        rows_->batches(), *columns.coarse, plan.clusters, num_slices(), kernels, threads_));
+  const Chunks& chunks = rows_->reduced_chunks();
+  switch (plan.kind) {
+    case SolverKind::blocks:
+      return stage_.set_solver(make_block_solver(columns_, threads_));
+    case SolverKind::dense:
+      return stage_.set_solver(make_dense_solver(columns_, kernels, threads_));
+    case SolverKind::sparse:
+      return stage_.set_solver(make_sparse_solver(columns_, chunks, kernels, threads_));
+    case SolverKind::explicit_cg:
+      return stage_.set_solver(
+          make_explicit_solver(columns_, chunks, plan.mixed, kernels, threads_));
+    case SolverKind::implicit_cg:
+      return stage_.set_solver(rows_->make_implicit(columns_, plan.mixed));
+  }
+}
+
+void PointSystem::fill_points(const std::vector<double>& points) {
+  const Batches& batches = rows_->batches();
+  PointState &held = state_.held, &tried = state_.tried;
+  held.points.allocate(kPointGroup * batches.groups.size());
+  tried.points.allocate(held.points.size());
+  threads_.for_ranges(batches.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (std::size_t l = 0; l < 8; ++l) {
+        const double* X = &points[3 * std::size_t(batches.lane_point[8 * g + l])];
+        for (std::size_t d = 0; d < 3; ++d) held.points[kPointGroup * g + 8 * d + l] = X[d];
+      }
+  });
+}
+
+/// Homogeneous points are about the mean camera centre, in units of the cameras' mean distance from
+/// it, so that neither the place of the scene nor its unit matters. Points that are held have no
+/// charts: nothing of them may move.
+void PointSystem::place_charts() {
+  if (rules_.held || rules_.charts == ChartBase::none) return;
+  const std::vector<RigidMotion<double>>& poses = state_.held.cameras.poses;
+  const auto centre = [](const RigidMotion<double>& pose, std::size_t k) {
+    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+    const auto& t = pose.translation;
+    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  };
+  chart_.base = rules_.charts;
+  chart_.crosses = !rules_.watch_behind;
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const auto& pose : poses) chart_.origin[k] += centre(pose, k);
+    chart_.origin[k] /= static_cast<double>(poses.size());
+  }
+  double length = 0;
+  for (const auto& pose : poses)
+    length += std::hypot(centre(pose, 0) - chart_.origin[0], centre(pose, 1) - chart_.origin[1],
+                         centre(pose, 2) - chart_.origin[2]);
+  chart_.unit = towards_one(length / static_cast<double>(poses.size()));
+}
+
+Step PointSystem::propose(const StepRequest& request) {
+  const bool reuse = only_radius_is_new(request);
+  request_ = request;
+  if (reuse) {
+    step_.reused = true;
+    step_.linear_iterations = 0;
+    if (stage_.shorten(sums_, request_)) plane_.reset();
+    return step_;
+  }
+  plane_.reset();
+  proposed_ = descended_ = false;
+  step_ = linearize(request);
+  proposed_ = step_.solved;
+  return step_;
+}
+
+Step PointSystem::linearize(const StepRequest& request) {
+  rows_->begin(request);
+  loss_ = request.loss;
+  const bool weighted = loss_.kind != LossKind::none && rows_->keeps_weights();
+  const std::size_t weights = weighted ? 8 * rows_->batches().num_batches() : 0;
+  if (state_.weights.size() != weights) state_.weights.allocate(weights);
+  chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
+  std::vector<EliminateOutput> outputs(num_slices());
+  eliminate(request, outputs);
+  add_slices(tiles_, num_slices(), threads_);
+  add_slices(diagonal_, num_slices(), threads_);
+  sums_ = rows_->finish(tiles_.data(), diagonal_.data());
+  return collect_step(request, outputs);
+}
+
+void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOutput>& outputs) {
+  const Chunks& chunks = rows_->chunks();
+  const std::size_t tile_doubles = kTileDoubles * chunks.tiles.size();
+  const std::size_t diagonal_doubles = kDiagonalDoubles * rows_->num_blocks();
+  const Elimination in{request.damping, rules_.held, loss_, chart_};
+  CoarseSpace* const coarse = stage_.coarse();
+  if (coarse != nullptr) coarse->begin(rows_->held_cameras(), request.damping);
+  threads_.for_each(outputs.size(), [&](std::size_t s) {
+    Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
+    if (scratch.size() == 0) scratch.allocate(rows_->scratch());
+    double* tiles = tiles_.data() + s * tile_doubles;
+    double* diagonal = diagonal_.data() + s * diagonal_doubles;
+    std::fill_n(tiles, tile_doubles, 0.0);
+    std::fill_n(diagonal, diagonal_doubles, 0.0);
+    if (coarse != nullptr) coarse->clear(s);
+    outputs[s] = {state_.factors.data(), 0, 0, 0, 0, state_.weights.data()};
+    for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
+      const Records records = rows_->eliminate(in, c, scratch.data(), tiles, diagonal, outputs[s]);
+      if (coarse != nullptr) coarse->add(s, chunks.chunks[c], records);
+    }
+  });
+}
+
+Step PointSystem::collect_step(const StepRequest& request,
+                               const std::vector<EliminateOutput>& outputs) {
+  double square_sum = 0, loss_sum = 0, gradient2 = 0;
+  point_decrease_ = 0;
+  for (const EliminateOutput& out : outputs) {
+    square_sum += out.square_sum;
+    loss_sum += out.loss_sum;
+    point_decrease_ += out.point_decrease;
+    gradient2 = std::max(gradient2, out.gradient_max2);
+  }
+  double totals[] = {square_sum, loss_sum, point_decrease_};
+  reduction_.sum(totals, 3);
+  reduction_.max(&gradient2, 1);
+  point_decrease_ = totals[2];
+  const Costs costs = rows_->held_costs(Costs::of(loss_, totals[0], totals[1]));
+  Step step;
+  step.plain_cost = costs.square / 2;
+  step.cost = costs.robust / 2;
+  mean_square_ = 2 * step.cost / static_cast<double>(rows_->batches().observations);
+  // w is whitened by V (1 + damping): undo the damping's part.
+  step.gradient_max =
+      std::max(std::sqrt(gradient2 * (1 + request.damping)), stage_.gather(sums_, request.damping));
+  step.solved = costs.finite() && stage_.solve(sums_, request, step);
+  return step;
+}
+
+PointTrial PointSystem::point_trial(const DoglegStep& step) const {
+  PointTrial out{rules_.watch_behind,
+                 rules_.held ? 0 : rules_.inner_iterations,
+                 mean_square_,
+                 loss_,
+                 chart_,
+                 {}};
+  if (plane_ && !rules_.held) {
+    out.blend.newton = step.newton;
+    out.blend.descent = step.descent * request_.damping;
+    out.blend.inner_damping *= std::max(1.0, damping_of(*plane_, step) / request_.damping);
+  }
+  return out;
+}
+
+/// The records keep the step that was solved for: points follow it by back-substitution.
+Trial PointSystem::try_step(const DoglegStep& step) {
+  Trial out;
+  out.step_norm =
+      camera_columns_.step(state_.held.cameras, blend_cameras(step), state_.tried.cameras);
+  rows_->step(stage_.step());
+  const PointTrial in = point_trial(step);
+  const Chunks& chunks = rows_->chunks();
+  std::vector<TrialOutput> outputs(num_slices());
+  threads_.for_each(outputs.size(), [&](std::size_t s) {
+    outputs[s] = {state_.tried.points.data(), 0, 0, 0, 0};
+    for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c)
+      rows_->trial(in, c, outputs[s]);
+  });
+  // The decrease goes on from the points' part of the elimination.
+  double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
+  newton_damping_ = 0;
+  for (const TrialOutput& o : outputs) {
+    square_sum += o.square_sum;
+    loss_sum += o.loss_sum;
+    decrease += o.damping_term;
+    newton_damping_ += o.damping_term;
+    step2 = std::max(step2, o.step2_max);
+    out.newly_behind += o.newly_behind;
+  }
+  const Costs costs = rows_->tried_costs(in, Costs::of(loss_, square_sum, loss_sum), out);
+  out.plain_cost = costs.square / 2;
+  out.cost = trial_cost_ = costs.robust / 2;
+  out.predicted_decrease = stage_.add_decrease(decrease) / 2;
+  out.step_norm = std::max(out.step_norm, std::sqrt(step2));
+  return out;
+}
+
+void PointSystem::accept() {
+  stage_.moved(trial_cost_);
+  std::swap(state_.held, state_.tried);
+  rows_->accepted();
+  proposed_ = false;
+}
+
+double PointSystem::residual_scale(double quantile) { return rows_->residual_scale(quantile); }
+
+void PointSystem::store_points(std::vector<double>& points) const {
+  const Batches& batches = rows_->batches();
+  const Buffer<double>& held = state_.held.points;
+  threads_.for_ranges(batches.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
+    for (; g < end; ++g)
+      for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l) {
+        double* X = &points[3 * std::size_t(batches.lane_point[8 * g + l])];
+        for (std::size_t d = 0; d < 3; ++d) X[d] = held[kPointGroup * g + 8 * d + l];
+      }
+  });
+}
+
+std::uint64_t PointSystem::bytes() const {
+  std::uint64_t sum = state_.held.points.bytes() + state_.tried.points.bytes() +
+                      state_.factors.bytes() + state_.weights.bytes() + tiles_.bytes() +
+                      diagonal_.bytes() + scratch_.size() * 8 * rows_->scratch();
+  if (passes_) sum += passes_->bytes();
+  return sum + rows_->bytes() + stage_.bytes();
+}
+
+}  // namespace sheaf
