@@ -171,16 +171,12 @@ def relative(a, b):
 
 
 def costs_apart(ours, theirs):
-    """How far two runs' costs are apart after one step and at the end, in words."""
-    words = []
+    """How far two runs' costs are apart, relatively: after one step and at the end, or None."""
     try:
-        first = [x["iterations"][1]["cost"] for x in (ours, theirs)]
-        words.append(f"cost after one step {relative(*first):.1e}")
+        first = relative(*(x["iterations"][1]["cost"] for x in (ours, theirs)))
+        return first, relative(ours["final_cost"], theirs["final_cost"])
     except (KeyError, IndexError, TypeError):
-        pass
-    if all(isinstance(x.get("final_cost"), float) for x in (ours, theirs)):
-        words.append(f"at the end {relative(ours['final_cost'], theirs['final_cost']):.1e}")
-    return f" ({', '.join(words)}, relatively)" if words else ""
+        return None
 
 
 def read_list(path):
@@ -190,7 +186,7 @@ def read_list(path):
 
 def report_differences(ours, theirs, our_costs, their_costs):
     """Prints each line that differs and returns how many do."""
-    count = 0
+    count, furthest = 0, [0, 0]
     for name in sorted(ours.keys() | theirs.keys()):
         if ours.get(name) == theirs.get(name):
             continue
@@ -199,9 +195,13 @@ def report_differences(ours, theirs, our_costs, their_costs):
             print(f"only in the {'second' if name not in ours else 'first'}: {name}")
             continue
         command = name.rsplit("/json", 1)[0]
-        both = name.endswith("/json") and command in our_costs and command in their_costs
-        print(f"differs: {name}"
-              + (costs_apart(our_costs[command], their_costs[command]) if both else ""))
+        apart = costs_apart(our_costs.get(command), their_costs.get(command))
+        if name.endswith("/json") and apart:
+            furthest = [max(pair) for pair in zip(furthest, apart)]
+            name += " (costs apart by {:.1e} after one step, {:.1e} at the end)".format(*apart)
+        print(f"differs: {name}")
+    if any(furthest):
+        print("costs are apart by at most {:.1e} after one step, {:.1e} at the end".format(*furthest))
     return count
 
 
