@@ -9,6 +9,7 @@ import xml.dom.minidom
 
 import cost_plot
 import evaluate
+import old_new
 import run_table
 import side_by_side
 import suite
@@ -191,9 +192,21 @@ def check_ladder():
         assert [cameras[8], cameras[17], cameras[16]] == [0, 0, 0.5] and len(points) == 6
 
 
+def check_old_new():
+    # Fewer than 6 of 21 coins show heads with probability 0.0133, fewer than 7 with 0.0392.
+    assert old_new.sign_interval([float(i) for i in range(1, 22)]) == (6.0, 16.0)
+    assert old_new.sign_interval([3.0, 1.0, 2.0, 6.0, 5.0, 4.0]) == (1.0, 6.0)
+    turns = []
+    ratios = old_new.measure(4, lambda: turns.append("old") or {"a": 2.0, "b": 1.0},
+                             lambda: turns.append("new") or {"a": 3.0})
+    assert turns == ["old", "new", "new", "old"] * 2 and ratios == {"a": [1.5] * 4}
+    text, slower = old_new.report({"a": [1.5] * 6, "b": [1.01] * 6}, 0.02)
+    assert slower == ["a"] and "1.500  [+50.0 %, +50.0 %]  slower" in text
+
+
 def run():
     for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages,
-                  check_suite, check_ladder):
+                  check_suite, check_ladder, check_old_new):
         check()
         print(f"{check.__name__}: passed")
     return 0

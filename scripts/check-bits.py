@@ -201,7 +201,7 @@ def report_differences(ours, theirs, our_costs, their_costs):
             name += " (costs apart by {:.1e} after one step, {:.1e} at the end)".format(*apart)
         print(f"differs: {name}")
     if any(furthest):
-        print("costs are apart by at most {:.1e} after one step, {:.1e} at the end".format(*furthest))
+        print("costs are at most {:.1e} apart after one step, {:.1e} at the end".format(*furthest))
     return count
 
 
