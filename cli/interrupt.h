@@ -3,8 +3,9 @@
 #pragma once
 
 #include <atomic>
-#include <stop_token>
 #include <thread>
+
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -24,13 +25,13 @@ class Interrupt {
 
   void begin_solve() { phase_ = Phase::solve; }
   void begin_write() { phase_ = Phase::write; }
-  std::stop_token token() const { return stop_.get_token(); }
+  StopToken token() const { return stop_.get_token(); }
 
  private:
   enum class Phase { read, solve, write, over };
   void watch();
 
-  std::stop_source stop_;
+  StopSource stop_;
   std::atomic<Phase> phase_{Phase::read};
   bool quiet_;
   std::thread watcher_;

@@ -100,7 +100,7 @@ std::string ProgramOutcome::failure() const {
 
 ProgramOutcome run_program(const std::vector<std::string>& words,
                            const std::vector<std::string>& variables, const fs::path& folder,
-                           double limit_s, const std::stop_token& stop) {
+                           double limit_s, const StopToken& stop) {
   const Timer timer;
   ::signal(SIGCHLD, SIG_DFL);  // where a parent has it ignored, no exit code would come back
   const pid_t process = spawn(words, variables, folder);

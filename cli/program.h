@@ -3,9 +3,10 @@
 #pragma once
 
 #include <filesystem>
-#include <stop_token>
 #include <string>
 #include <vector>
+
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -26,7 +27,7 @@ struct ProgramOutcome {
 ProgramOutcome run_program(const std::vector<std::string>& words,
                            const std::vector<std::string>& variables,
                            const std::filesystem::path& folder, double limit_s,
-                           const std::stop_token& stop);
+                           const StopToken& stop);
 
 /// A folder of its own, removed with all in it at the end. Throws Error
 /// (ErrorCode::unwritable_output) when it cannot be made.

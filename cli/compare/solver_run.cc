@@ -198,8 +198,7 @@ void check_start(const RunSetting& setting, SolverRun& run) {
 }  // namespace
 
 RunSetting::RunSetting(const std::string& in, const InputFile& input, const Problem* truth,
-                       int count, const RunLimits& given, const fs::path& folder,
-                       std::stop_token token)
+                       int count, const RunLimits& given, const fs::path& folder, StopToken token)
     : problem(input.problem),
       reference(truth),
       path(fs::absolute(in)),

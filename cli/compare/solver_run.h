@@ -3,13 +3,13 @@
 #pragma once
 
 #include <filesystem>
-#include <stop_token>
 #include <string>
 
 #include "compare/solver_programs.h"
 #include "refinement.h"
 #include "report/comparison.h"
 #include "sheaf/io.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -28,7 +28,7 @@ struct RunLimits {
 /// folder.
 struct RunSetting {
   RunSetting(const std::string& path, const InputFile& input, const Problem* reference, int threads,
-             const RunLimits& limits, const std::filesystem::path& scratch, std::stop_token stop);
+             const RunLimits& limits, const std::filesystem::path& scratch, StopToken stop);
 
   const Problem& problem;
   const Problem* reference;  ///< or null
@@ -38,7 +38,7 @@ struct RunSetting {
   RunLimits limits;
   double kill_after_s;  ///< reading and writing included
   std::filesystem::path scratch;
-  std::stop_token stop;
+  StopToken stop;
 };
 
 /// Runs one solver in a process of its own and evaluates what it wrote. Whatever goes wrong with it

@@ -10,7 +10,7 @@
 
 namespace sheaf {
 
-PhotometricDemo run_photometric_demo(std::uint64_t seed, int threads, const std::stop_token& stop) {
+PhotometricDemo run_photometric_demo(std::uint64_t seed, int threads, const StopToken& stop) {
   PhotometricDemo demo;
   PhotometricSceneOptions& o = demo.scene;
   o.images = 5, o.points = 800, o.relief = 0.01;

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <stop_token>
 
 #include "json_document.h"
 #include "report/errors.h"
 #include "sheaf/photometric.h"
 #include "sheaf/solve.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -20,7 +20,7 @@ struct PhotometricDemo {
   double seconds = 0;         ///< of the refinement
 };
 
-PhotometricDemo run_photometric_demo(std::uint64_t seed, int threads, const std::stop_token& stop);
+PhotometricDemo run_photometric_demo(std::uint64_t seed, int threads, const StopToken& stop);
 void tell(const PhotometricDemo& demo);
 Json photometric_demo_json(const PhotometricDemo& demo);
 

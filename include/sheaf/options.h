@@ -4,10 +4,10 @@
 
 #include <functional>
 #include <limits>
-#include <stop_token>
 
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -83,7 +83,7 @@ struct SolveOptions {
   std::function<void(const Summary&)> on_plan{};
   /// Called after the start was evaluated (index 0) and after every step; return false to stop.
   std::function<bool(const Iteration&)> on_iteration{};
-  std::stop_token stop{};  ///< asks the solver to end within one evaluation
+  StopToken stop{};  ///< asks the solver to end within one evaluation
 };
 
 }  // namespace sheaf

@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -153,7 +153,7 @@ struct PhotometricOptions {
   double time_limit_s = std::numeric_limits<double>::infinity();
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   std::function<bool(const Iteration&)> on_iteration{};  ///< return false to stop
-  std::stop_token stop{};
+  StopToken stop{};
 };
 
 /// A patch in an image that shows it.

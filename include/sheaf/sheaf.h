@@ -11,3 +11,4 @@
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
+#include "sheaf/stop.h"

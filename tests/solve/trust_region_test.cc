@@ -9,7 +9,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <stop_token>
 #include <vector>
 
 namespace sheaf {
@@ -232,7 +231,7 @@ TEST(TrustRegion, TheCallbackStops) {
 
 TEST(TrustRegion, TheStopTokenStops) {
   Valley valley(kStart);
-  std::stop_source source;
+  StopSource source;
   SolveOptions options;
   options.stop = source.get_token();
   options.on_iteration = [&](const Iteration& it) {
