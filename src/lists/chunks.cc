@@ -3,12 +3,12 @@
 #include "lists/chunks.h"
 
 #include <algorithm>
-#include <atomic>
 #include <optional>
 #include <unordered_map>
 
 #include "lists/slices.h"
 #include "platform/parallel.h"
+#include "platform/shared_word.h"
 
 namespace sheaf {
 namespace {
@@ -66,8 +66,8 @@ class TileNumbers {
       return;
     }
     // Most are marked already: reading first keeps the line shared among threads.
-    std::atomic_ref<std::uint32_t> number(number_[triangular(row, column)]);
-    if (number.load(std::memory_order_relaxed) != 0) number.store(0, std::memory_order_relaxed);
+    std::uint32_t& number = number_[triangular(row, column)];
+    if (load_shared(number) != 0) store_shared(number, 0u);
   }
   void assign() {
     if (dense_) {

@@ -3,10 +3,11 @@
 #include "reduced/clusters.h"
 
 #include <algorithm>
-#include <atomic>
 #include <map>
 #include <queue>
 #include <utility>
+
+#include "platform/shared_word.h"
 
 namespace sheaf {
 
@@ -180,8 +181,8 @@ std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clu
   if (clusters.count == 0) return number;
   const auto mark = [&](std::int32_t a, std::int32_t b) {
     // Most are marked already: reading first keeps the line shared among threads.
-    std::atomic_ref<std::int32_t> at(number[cluster_pair(a, b)]);
-    if (at.load(std::memory_order_relaxed) != 0) at.store(0, std::memory_order_relaxed);
+    std::int32_t& at = number[cluster_pair(a, b)];
+    if (load_shared(at) != 0) store_shared(at, 0);
   };
   const std::size_t looked_at = (batches.groups.size() + stride - 1) / stride;
   threads.for_ranges(looked_at, kGroups, [&](std::size_t first, std::size_t end) {

@@ -10,6 +10,7 @@
 
 #include "eliminate/kernels.h"
 #include "lists/slices.h"
+#include "platform/shared_word.h"
 #include "reduced/block_rows.h"
 #include "reduced/coarse_space.h"
 #include "reduced/sparse_cholesky.h"
@@ -32,9 +33,8 @@ std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vec
           const std::uint64_t at = row_start(set[i]) + set[j];
           const std::uint64_t bit = std::uint64_t(1) << (at % 64);
           // Most are marked already: reading first keeps the line shared among threads.
-          std::atomic_ref<std::uint64_t> word(marked[at / 64]);
-          if ((word.load(std::memory_order_relaxed) & bit) == 0)
-            word.fetch_or(bit, std::memory_order_relaxed);
+          std::uint64_t& word = marked[at / 64];
+          if ((load_shared(word) & bit) == 0) set_shared_bits(word, bit);
         }
     });
   });
