@@ -136,9 +136,10 @@ double best_rate(int threads, double seconds, const Pass& pass) {
       line.arrive_and_wait();
     }
   };
-  std::vector<std::jthread> pool;
+  std::vector<std::thread> pool;
   for (int t = 1; t < threads; ++t) pool.emplace_back(work, t);
   work(0);
+  for (std::thread& thread : pool) thread.join();
   return best;
 }
 

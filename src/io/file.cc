@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <chrono>
+#include <future>
 #include <new>
-#include <thread>
 
 #include "io/bal.h"
 #include "io/bal_sink.h"
@@ -65,8 +65,8 @@ Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
   InputFile file;
   // A pipe can be read only once: its bytes are hashed as they pass.
   Sha256 passing;
-  std::jthread hashing;
-  if (hash && raw.size()) hashing = std::jthread([&file, &path] { file.sha256 = hash_file(path); });
+  std::future<std::string> hashing;  // waits for its thread wherever this function returns
+  if (hash && raw.size()) hashing = std::async(std::launch::async, hash_file, path);
   if (hash && !raw.size()) raw.hash_into(&passing);
 
   Result<ByteSource> source = ByteSource::open(std::move(raw));
@@ -77,8 +77,8 @@ Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
   file.compression = to_string(source.value().compression());
   file.bytes = source.value().raw().bytes_read();
   file.read_s = seconds_since(start);
-  if (hashing.joinable()) {
-    hashing.join();
+  if (hashing.valid()) {
+    file.sha256 = hashing.get();
   } else if (hash) {
     file.sha256 = passing.hex_digest();
   }

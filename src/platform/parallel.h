@@ -26,6 +26,14 @@ namespace sheaf {
 
 #if defined(SHEAF_PLAIN_THREADS)
 inline thread_local int plain_worker = 0;
+
+/// Threads that are waited for, whatever is thrown meanwhile.
+struct Joined {
+  std::vector<std::thread> threads;
+  ~Joined() {
+    for (std::thread& thread : threads) thread.join();
+  }
+};
 #endif
 
 /// Runs independent tasks on a fixed number of threads. Results must not depend on which thread
@@ -69,8 +77,8 @@ class Threads {
       plain_worker = static_cast<int>(first);
       for (std::size_t i = first; i < tasks; i += count_) task(i);
     };
-    std::vector<std::jthread> others;
-    for (int i = 1; i < count_; ++i) others.emplace_back(work, i);
+    Joined others;
+    for (int i = 1; i < count_; ++i) others.threads.emplace_back(work, i);
     work(0);
 #else
     arena_.execute([&] {
