@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <limits>
 #include <map>
 #include <string_view>
 #include <vector>
 
+#include "platform/real_text.h"
 #include "verb.h"
 
 namespace sheaf {
@@ -27,7 +27,7 @@ bool parse_intrinsics(std::string_view text, NoiseOptions& out) {
     const bool percent = !item.empty() && item.back() == '%';
     if (percent) item.remove_suffix(1);
     double sigma = 0;
-    const auto [stop, error] = std::from_chars(item.data(), item.data() + item.size(), sigma);
+    const auto [stop, error] = read_real(item.data(), item.data() + item.size(), sigma);
     if (error != std::errc() || stop != item.data() + item.size()) return false;
     if (!(sigma >= 0 && sigma <= std::numeric_limits<double>::max())) return false;
     (percent ? out.intrinsics_relative : out.intrinsics)[k] = percent ? sigma / 100 : sigma;

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -13,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "platform/real_text.h"
 #include "verb.h"
 
 namespace sheaf {
@@ -106,7 +106,7 @@ bool parse_scale(std::string_view text, double& scale_px) {
   scale_px = kAutomaticScale;
   if (text.empty() || text == "auto") return true;
   const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, scale_px);
+  const auto [stop, error] = read_real(text.data(), end, scale_px);
   return error == std::errc() && stop == end && scale_px > 0 && std::isfinite(scale_px);
 }
 

@@ -7,13 +7,22 @@
 #include <algorithm>
 #include <charconv>
 
+#include "platform/real_text.h"
+
 namespace sheaf {
 namespace {
+
+std::from_chars_result read_number(const char* begin, const char* end, long long& out) {
+  return std::from_chars(begin, end, out);
+}
+std::from_chars_result read_number(const char* begin, const char* end, double& out) {
+  return read_real(begin, end, out);
+}
 
 template <class Number>
 bool parse(const std::string& text, Number& out) {
   const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, out);
+  const auto [stop, error] = read_number(text.data(), end, out);
   return error == std::errc() && stop == end;
 }
 

@@ -3,10 +3,10 @@
 #include "photometric/photometric_input.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "platform/real_text.h"
 #include "report/errors.h"
 #include "verb.h"
 
@@ -17,7 +17,7 @@ std::string parse_intrinsics(const std::string& text, Pinhole& out) {
   std::array<double, 4> v{};
   const char *p = text.data(), *end = p + text.size();
   for (std::size_t k = 0; k < v.size(); ++k) {
-    const auto [stop, error] = std::from_chars(p, end, v[k]);
+    const auto [stop, error] = read_real(p, end, v[k]);
     const bool last = k + 1 == v.size();
     if (error != std::errc() || !std::isfinite(v[k]) || (k < 2 && v[k] == 0) ||
         (last ? stop != end : stop == end || *stop != ','))
