@@ -74,9 +74,12 @@ class CameraSolver {
 std::unique_ptr<CameraSolver> make_dense_solver(const Columns& columns, const Kernels& kernels,
                                                 Threads& threads);
 
-/// S stored by supernodes in an order that keeps fill low, and factored there.
-std::unique_ptr<CameraSolver> make_sparse_solver(const Columns& columns, const Chunks& chunks,
-                                                 const Kernels& kernels, Threads& threads);
+struct ColumnAnalysis;
+/// S stored by supernodes in an order that keeps fill low, and factored there. analysis: of these
+/// columns and tiles, where somebody has it already.
+std::unique_ptr<CameraSolver> make_sparse_solver(
+    const Columns& columns, const Chunks& chunks, const Kernels& kernels, Threads& threads,
+    std::shared_ptr<const ColumnAnalysis> analysis = nullptr);
 
 /// One small system for each image: exact where images do not couple (points held, own lenses).
 std::unique_ptr<CameraSolver> make_block_solver(const Columns& columns, Threads& threads);

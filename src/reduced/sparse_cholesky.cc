@@ -51,8 +51,10 @@ struct SparseCholesky::Job {
   }
 };
 
-SparseCholesky::SparseCholesky(SymbolicFactor symbolic, const char* simd_name)
-    : symbolic_(std::move(symbolic)),
+SparseCholesky::SparseCholesky(std::shared_ptr<const SymbolicFactor> symbolic,
+                               const char* simd_name)
+    : shared_(std::move(symbolic)),
+      symbolic_(*shared_),
       kernels_(dense_kernels(simd_name)),
       panels_(symbolic_.panel_doubles),
       inverse_(symbolic_.size()),

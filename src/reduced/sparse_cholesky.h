@@ -21,7 +21,7 @@ namespace sheaf {
 class SparseCholesky {
  public:
   /// simd_name: as for DenseCholesky.
-  SparseCholesky(SymbolicFactor symbolic, const char* simd_name);
+  SparseCholesky(std::shared_ptr<const SymbolicFactor> symbolic, const char* simd_name);
 
   static std::uint64_t bytes(const SymbolicFactor& symbolic);
   const SymbolicFactor& symbolic() const { return symbolic_; }
@@ -62,7 +62,8 @@ class SparseCholesky {
   void forward(const Supernode& s);
   void backward(const Supernode& s);
 
-  SymbolicFactor symbolic_;
+  const std::shared_ptr<const SymbolicFactor> shared_;
+  const SymbolicFactor& symbolic_;  ///< what is shared
   const DenseKernels& kernels_;
   Buffer<double> panels_;
   std::vector<double> inverse_;

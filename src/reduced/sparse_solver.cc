@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "reduced/camera_solver.h"
@@ -50,9 +51,18 @@ struct Piece {
 /// S stored and factored by supernodes.
 class SparseSolver : public CameraSolver {
  public:
-  SparseSolver(const Columns& columns, const Chunks& chunks, const Kernels& kernels,
+  SparseSolver(const Columns& columns, const Chunks& chunks,
+               const std::shared_ptr<const ColumnAnalysis>& analysis, const Kernels& kernels,
                Threads& threads)
-      : SparseSolver(columns, chunks, build_column_graph(columns, chunks.tiles), kernels, threads) {
+      : tiles_(static_cast<std::uint32_t>(chunks.tiles.size())),
+        threads_(threads),
+        parts_(columns, analysis->graph),
+        cholesky_({analysis, &analysis->symbolic}, kernels.name) {
+    const SymbolicFactor& symbolic = cholesky_.symbolic();
+    column_at_.resize(symbolic.size());
+    for (std::size_t c = 0; c < symbolic.size(); ++c)
+      column_at_[symbolic.position[c]] = static_cast<std::int32_t>(c);
+    list_pieces(chunks, analysis->graph);
   }
 
   CameraSolution solve(const CameraSystem& system, Buffer<double>& x) override {
@@ -76,19 +86,6 @@ class SparseSolver : public CameraSolver {
   }
 
  private:
-  SparseSolver(const Columns& columns, const Chunks& chunks, const ColumnGraph& graph,
-               const Kernels& kernels, Threads& threads)
-      : tiles_(static_cast<std::uint32_t>(chunks.tiles.size())),
-        threads_(threads),
-        parts_(columns, graph),
-        cholesky_(analyse(graph), kernels.name) {
-    const SymbolicFactor& symbolic = cholesky_.symbolic();
-    column_at_.resize(symbolic.size());
-    for (std::size_t c = 0; c < symbolic.size(); ++c)
-      column_at_[symbolic.position[c]] = static_cast<std::int32_t>(c);
-    list_pieces(chunks, graph);
-  }
-
   void list_pieces(const Chunks& chunks, const ColumnGraph& graph) {
     const SymbolicFactor& symbolic = cholesky_.symbolic();
     std::vector<Piece> pieces;
@@ -176,8 +173,10 @@ class SparseSolver : public CameraSolver {
 }  // namespace
 
 std::unique_ptr<CameraSolver> make_sparse_solver(const Columns& columns, const Chunks& chunks,
-                                                 const Kernels& kernels, Threads& threads) {
-  return std::make_unique<SparseSolver>(columns, chunks, kernels, threads);
+                                                 const Kernels& kernels, Threads& threads,
+                                                 std::shared_ptr<const ColumnAnalysis> analysis) {
+  if (analysis == nullptr) analysis = analyse_columns(columns, chunks.tiles);
+  return std::make_unique<SparseSolver>(columns, chunks, analysis, kernels, threads);
 }
 
 }  // namespace sheaf

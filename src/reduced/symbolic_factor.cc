@@ -262,4 +262,20 @@ SymbolicFactor analyse(const ColumnGraph& graph) {
   return out;
 }
 
+std::uint64_t ColumnAnalysis::bytes() const {
+  const auto size = [](const auto& v) { return v.size() * sizeof(v[0]); };
+  return size(graph.of_column) + size(graph.columns) + size(graph.first) + size(symbolic.position) +
+         size(symbolic.owner) + size(symbolic.supernodes) + size(symbolic.rows);
+}
+
+std::shared_ptr<const ColumnAnalysis> analyse_columns(const Columns& columns,
+                                                      const std::vector<Tile>& tiles) {
+  auto out = std::make_shared<ColumnAnalysis>();
+  out->graph = build_column_graph(columns, tiles);
+  out->symbolic = analyse(out->graph);
+  std::vector<std::int32_t>().swap(out->graph.neighbours);
+  std::vector<std::uint64_t>().swap(out->graph.first_neighbour);
+  return out;
+}
+
 }  // namespace sheaf

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "reduced/block_ordering.h"
@@ -39,5 +40,15 @@ struct SymbolicFactor {
   std::size_t size() const { return position.size(); }
 };
 SymbolicFactor analyse(const ColumnGraph& graph);
+
+/// Nodes and factor of a camera matrix: what a plan counts and a sparse solver works with.
+struct ColumnAnalysis {
+  ColumnGraph graph;  ///< its nodes; neighbours are known no more
+  SymbolicFactor symbolic;
+
+  std::uint64_t bytes() const;
+};
+std::shared_ptr<const ColumnAnalysis> analyse_columns(const Columns& columns,
+                                                      const std::vector<Tile>& tiles);
 
 }  // namespace sheaf

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <utility>
 
-#include "systems/dogleg_passes.h"
 #include "systems/residual_quantile.h"
 
 namespace sheaf {
@@ -29,7 +28,7 @@ void BalRows::attach(const SteppedState& state) {
   write_records(state.held.cameras, held_);
 }
 
-HeldState BalRows::held_state() {
+BalState BalRows::held_state() {
   return {&batches_, &chunks_, &held_, &state_->held.points, &state_->factors, &state_->weights};
 }
 
@@ -104,11 +103,11 @@ std::uint64_t BalRows::count_behind() const {
 }
 
 std::unique_ptr<CameraSolver> BalRows::make_implicit(const Columns& columns, bool mixed) {
-  return make_implicit_solver(columns, held_state(), mixed, kernels_, threads_);
-}
-
-std::unique_ptr<DoglegPasses> BalRows::make_dogleg(const Columns& columns, bool points_held) {
-  return std::make_unique<DoglegPasses>(columns, held_state(), points_held, kernels_, threads_);
+  auto exact = std::make_unique<BalOperator>(columns, held_state(), kernels_, threads_);
+  std::unique_ptr<StateOperator> rounded;
+  if (mixed)
+    rounded = std::make_unique<FloatBalOperator>(columns, held_state(), kernels_, exact->sums());
+  return make_implicit_solver(columns, std::move(exact), std::move(rounded), threads_);
 }
 
 }  // namespace sheaf

@@ -7,7 +7,7 @@
 
 #include "eliminate/kernels.h"
 #include "systems/arrangement.h"
-#include "systems/implicit_solver.h"
+#include "systems/bal_operators.h"
 #include "systems/point_rows.h"
 
 namespace sheaf {
@@ -33,12 +33,14 @@ class BalRows : public PointRows {
   double residual_scale(double quantile) const override;
   std::uint64_t count_behind() const override;
   std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
-  std::unique_ptr<DoglegPasses> make_dogleg(const Columns& columns, bool points_held) override;
+  std::unique_ptr<DoglegSource> make_dogleg() override {
+    return std::make_unique<BalDogleg>(held_state(), kernels_);
+  }
   std::uint64_t bytes() const override { return held_.bytes() + tried_.bytes(); }
 
  private:
   void write_records(const CameraState& cameras, Buffer<double>& records) const;
-  HeldState held_state();
+  BalState held_state();
 
   const Batches& batches_;
   const Chunks& chunks_;

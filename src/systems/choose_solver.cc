@@ -91,9 +91,13 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
                                        std::to_string(Chunks::kLongestTrack) +
                                        ": use the implicit iterative solver");
   const auto forecast = [&](const Plan& plan) {
-    return std::max(held.peak_bytes, held.resident_bytes + forecast_bytes(counts, plan, threads));
+    // An analysis that is there already is counted with the solver that uses it.
+    const std::uint64_t analysis = counts.analysis ? counts.analysis->bytes() : 0;
+    return std::max(held.peak_bytes,
+                    held.resident_bytes - analysis + forecast_bytes(counts, plan, threads));
   };
   choice.plan.mixed = takes_mixed(choice.plan.kind, counts, options);
+  if (choice.plan.kind == SolverKind::sparse) choice.plan.analysis = counts.analysis;
   choice.forecast_bytes = forecast(choice.plan);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;

@@ -3,17 +3,18 @@
 #include "systems/dogleg_passes.h"
 
 #include <array>
+#include <utility>
 
 namespace sheaf {
 
-DoglegPasses::DoglegPasses(const Columns& columns, const HeldState& state, bool points_held,
-                           const Kernels& kernels, Threads& threads)
-    : columns_(columns),
-      state_(state),
+DoglegPasses::DoglegPasses(std::unique_ptr<DoglegSource> source, const Columns& columns,
+                           const Chunks& chunks, bool points_held, Threads& threads)
+    : source_(std::move(source)),
+      columns_(columns),
+      chunks_(chunks),
       points_held_(points_held),
-      kernels_(dogleg_kernels(kernels.name)),
       threads_(threads),
-      sums_(state, threads),
+      sums_(chunks, columns.num_images(), 0, threads),
       direction_((static_cast<std::size_t>(columns.count) + 7) / 8 * 8) {}
 
 void DoglegPasses::descend(const double* damping, double lambda) {
@@ -27,28 +28,21 @@ void DoglegPasses::descend(const double* damping, double lambda) {
   sum_curvature(lambda);
 }
 
-ProductInput DoglegPasses::state() const {
-  return {state_.batches, state_.cameras->data(), state_.points->data(), state_.factors->data(),
-          state_.weights->data()};
-}
-
 void DoglegPasses::write_steps(const Buffer<double>& columns) {
-  sums_.for_each_image([&](std::size_t i) {
-    double* record = state_.cameras->data() + kCameraRecord * i;
+  sums_.for_each_block([&](std::size_t i) {
     double x[9];
     for (int k = 0; k < 9; ++k) {
       const std::int32_t c = columns_.image(i)[k];
       x[k] = c >= 0 ? columns[c] : 0;
     }
-    camera_record::write_step(record + camera_record::kFocal, x, record + camera_record::kStep);
+    source_->write_step(i, x);
   });
 }
 
 /// direction_ <- beta of the cameras. Images that share a lens add to its columns in their order.
 void DoglegPasses::sum_gradient() {
-  const ProductInput in = state();
   std::vector<std::array<double, 9>> of_image(columns_.num_images());
-  sums_.run([&](const Chunk& chunk, double*, double* sums) { kernels_.gradient(in, chunk, sums); },
+  sums_.run([&](const Chunk& chunk, double*, double* sums) { source_->gradient(chunk, sums); },
             [&](std::size_t i, const double* total) {
               for (int k = 0; k < 9; ++k) of_image[i][k] = total[k];
             });
@@ -60,12 +54,11 @@ void DoglegPasses::sum_gradient() {
 
 void DoglegPasses::sum_curvature(double lambda) {
   write_steps(direction_);
-  const CurvatureInput in{state(), lambda, points_held_};
-  const auto& slices = state_.chunks->slices;
+  const auto& slices = chunks_.slices;
   std::vector<CurvatureOutput> outputs(slices.size() - 1);
   threads_.for_each(outputs.size(), [&](std::size_t s) {
     for (std::uint32_t c = slices[s]; c < slices[s + 1]; ++c)
-      kernels_.curvature(in, state_.chunks->chunks[c], outputs[s]);
+      source_->curvature(chunks_.chunks[c], lambda, points_held_, outputs[s]);
   });
   curvature_ = 0;
   for (const CurvatureOutput& out : outputs) {
@@ -77,12 +70,11 @@ void DoglegPasses::sum_curvature(double lambda) {
 double DoglegPasses::point_damping(const Buffer<double>& step) {
   if (points_held_) return 0;
   write_steps(step);
-  const ProductInput in = state();
-  const auto& slices = state_.chunks->slices;
+  const auto& slices = chunks_.slices;
   std::vector<double> outputs(slices.size() - 1, 0.0);
   threads_.for_each(outputs.size(), [&](std::size_t s) {
     for (std::uint32_t c = slices[s]; c < slices[s + 1]; ++c)
-      outputs[s] += kernels_.point_damping(in, state_.chunks->chunks[c]);
+      outputs[s] += source_->point_damping(chunks_.chunks[c]);
   });
   double sum = 0;
   for (double x : outputs) sum += x;

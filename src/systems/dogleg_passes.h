@@ -3,14 +3,32 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "eliminate/dogleg_kernels.h"
+#include "lists/chunks.h"
 #include "lists/columns.h"
-#include "systems/implicit_solver.h"
+#include "platform/buffer.h"
 #include "systems/product_sums.h"
 
 namespace sheaf {
+
+/// What a dogleg asks of one kind of rows, at the state that was eliminated last.
+class DoglegSource {
+ public:
+  virtual ~DoglegSource() = default;
+  /// The step of a camera block, by its nine columns, for the passes that follow.
+  virtual void write_step(std::size_t block, const double* x) = 0;
+  /// Adds -J^T r of the cameras, kProductRecord for each block, as points' factors have eliminated
+  /// nothing of it.
+  virtual void gradient(const Chunk& chunk, double* sums) = 0;
+  /// Adds |J v|^2 and the points' part of |v|_C^2.
+  virtual void curvature(const Chunk& chunk, double lambda, bool points_held,
+                         CurvatureOutput& out) = 0;
+  /// Sum over points of d^T D d, where they follow the step.
+  virtual double point_damping(const Chunk& chunk) = 0;
+};
 
 /// Passes over the observations that a dogleg needs beyond those of a damped step, at the state
 /// that was eliminated last. Steepest descent of cameras and points together in the metric C =
@@ -18,10 +36,10 @@ namespace sheaf {
 /// is in their factors.
 class DoglegPasses {
  public:
-  DoglegPasses(const Columns& columns, const HeldState& state, bool points_held,
-               const Kernels& kernels, Threads& threads);
+  DoglegPasses(std::unique_ptr<DoglegSource> source, const Columns& columns, const Chunks& chunks,
+               bool points_held, Threads& threads);
 
-  // Both leave their direction as the step in the camera records.
+  // Both leave their direction as the step that the source knows.
 
   /// v. damping: D of each column, lambda C; the points' factors hold the same lambda.
   void descend(const double* damping, double lambda);
@@ -34,15 +52,14 @@ class DoglegPasses {
   std::uint64_t bytes() const { return sums_.bytes() + direction_.bytes(); }
 
  private:
-  ProductInput state() const;
   void write_steps(const Buffer<double>& columns);
   void sum_gradient();
   void sum_curvature(double lambda);
 
+  const std::unique_ptr<DoglegSource> source_;
   const Columns& columns_;
-  HeldState state_;
+  const Chunks& chunks_;
   const bool points_held_;
-  const DoglegKernels& kernels_;
   Threads& threads_;
   ProductSums sums_;
   Buffer<double> direction_;

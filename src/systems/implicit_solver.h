@@ -2,26 +2,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "reduced/camera_solver.h"
+#include "reduced/conjugate_gradients.h"
 
 namespace sheaf {
 
-/// What the implicit product reads: the held state, whose camera records carry x as their step.
-struct HeldState {
-  const Batches* batches;
-  const Chunks* chunks;
-  Buffer<double>* cameras;
-  const Buffer<double>* points;
-  const Buffer<double>* factors;
-  const Buffer<double>* weights;  ///< of the loss; empty: none
+/// S x with the Jacobians computed again from the held state, whatever the rows are.
+class StateOperator : public ImageOperator {
+ public:
+  /// Before a run at a newly eliminated state; squares: diag(J^T J) by column.
+  virtual void prepare(const double* squares) = 0;
+  virtual std::uint64_t bytes() const = 0;
 };
 
-/// Conjugate gradients with S never formed: products recompute the Jacobians from the state; mixed:
-/// in single precision.
-std::unique_ptr<CameraSolver> make_implicit_solver(const Columns& columns, const HeldState& state,
-                                                   bool mixed, const Kernels& kernels,
+/// Conjugate gradients with S never formed. rounded: in single precision, taken until the system
+/// asks for double; may be null.
+std::unique_ptr<CameraSolver> make_implicit_solver(const Columns& columns,
+                                                   std::unique_ptr<StateOperator> exact,
+                                                   std::unique_ptr<StateOperator> rounded,
                                                    Threads& threads);
 
 }  // namespace sheaf

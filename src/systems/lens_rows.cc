@@ -6,10 +6,37 @@
 #include <numeric>
 
 #include "geometry/camera_model.h"
-#include "systems/lens_implicit.h"
+#include "systems/implicit_solver.h"
+#include "systems/product_sums.h"
 #include "systems/residual_quantile.h"
 
 namespace sheaf {
+
+/// S x with the rows computed again, by blocks of images and lenses alike.
+class LensRows::Operator : public StateOperator {
+ public:
+  Operator(const LensRows& rows, const Columns& columns)
+      : rows_(rows),
+        sums_(rows.chunks_, columns.num_images(),
+              product_scratch_doubles(rows.arranged_.batches, rows.arranged_.tracks),
+              rows.threads_) {}
+
+  void prepare(const double*) override {}
+  void apply(const double* x, double* y) override {
+    const SteppedState& state = *rows_.state_;
+    const LensProductInput in{rows_.held_input(), state.factors.data(), state.weights.data(), x};
+    sums_.run([&](const Chunk& chunk, double* saved,
+                  double* sums) { rows_.lens_kernels_.product(in, chunk, saved, sums); },
+              [&](std::size_t i, const double* total) {
+                std::copy_n(total, kCameraColumns, y + kImageVector * i);
+              });
+  }
+  std::uint64_t bytes() const override { return sums_.bytes(); }
+
+ private:
+  const LensRows& rows_;
+  ProductSums sums_;
+};
 
 LensRows::LensRows(const Arrangement& arrangement, const Kernels& kernels, Threads& threads)
     : arranged_(arrangement),
@@ -134,12 +161,8 @@ double LensRows::residual_scale(double quantile) const {
 }
 
 std::unique_ptr<CameraSolver> LensRows::make_implicit(const Columns& columns, bool) {
-  return make_lens_implicit_solver(
-      columns, chunks_,
-      [this] {
-        return LensProductInput{held_input(), state_->factors.data(), state_->weights.data()};
-      },
-      lens_kernels_, threads_);
+  return make_implicit_solver(columns, std::make_unique<Operator>(*this, columns), nullptr,
+                              threads_);
 }
 
 std::uint64_t LensRows::bytes() const {

@@ -35,6 +35,7 @@ class LensRows : public PointRows {
   std::uint64_t bytes() const override;
 
  private:
+  class Operator;
   struct LensCameras {
     Buffer<double> images, lenses;  ///< kCameraRecord, kLensStateRecord each
   };

@@ -141,7 +141,8 @@ void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
   c.sparse_flops = n * n * n / 3;
   c.sparse_doubles = c.columns * (c.columns + 8);
   if (tiles.size() == c.tiles) {
-    const SymbolicFactor symbolic = analyse(build_column_graph(columns, tiles));
+    c.analysis = analyse_columns(columns, tiles);
+    const SymbolicFactor& symbolic = c.analysis->symbolic;
     c.sparse_flops = symbolic.flops;
     c.sparse_doubles = symbolic.panel_doubles;
     c.sparse_bytes = SparseCholesky::bytes(symbolic) - 8 * symbolic.panel_doubles;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "lists/columns.h"
 #include "platform/parallel.h"
 #include "reduced/clusters.h"
+#include "reduced/symbolic_factor.h"
 
 namespace sheaf {
 
@@ -28,7 +30,8 @@ struct WorkCounts {
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
   double sparse_flops = 0;
   std::uint64_t sparse_doubles = 0;
-  std::uint64_t sparse_bytes = 0;  ///< beside these
+  std::uint64_t sparse_bytes = 0;                  ///< beside these
+  std::shared_ptr<const ColumnAnalysis> analysis;  ///< which these are counted from; or null
   /// Of the coarse space of the iterative solvers; 0: none.
   std::uint64_t clusters = 0, cluster_pairs = 0;
   std::uint32_t longest_track = 0;
@@ -55,7 +58,8 @@ void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
 struct Plan {
   SolverKind kind = SolverKind::dense;
   std::string reason;
-  bool mixed = false;   ///< float inside the solver
+  bool mixed = false;                                ///< float inside the solver
+  std::shared_ptr<const ColumnAnalysis> analysis{};  ///< of a sparse solver, where counted
   Clusters clusters{};  ///< of an iterative solver's coarse space, as count_work finds them
 };
 

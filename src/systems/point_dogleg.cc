@@ -37,7 +37,9 @@ Trial PointSystem::trial() {
 }
 
 DoglegPasses& PointSystem::passes() {
-  if (passes_ == nullptr) passes_ = rows_->make_dogleg(columns_, rules_.held);
+  if (passes_ == nullptr)
+    passes_ = std::make_unique<DoglegPasses>(rows_->make_dogleg(), columns_, rows_->chunks(),
+                                             rules_.held, threads_);
   return *passes_;
 }
 

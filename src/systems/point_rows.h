@@ -50,7 +50,7 @@ struct PointTrial {
   PointBlend blend{};
 };
 
-class DoglegPasses;
+class DoglegSource;
 
 /// The rows of one kind, such as reprojections through BAL lenses, through lenses of any model, or
 /// patches of pixels: everything that PointSystem does not know of its observations. Rows hold
@@ -107,7 +107,7 @@ class PointRows {
   /// Conjugate gradients with the products computed again from the held state; null: not to be had.
   virtual std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) = 0;
   /// What a dogleg asks of the rows; null: not to be had.
-  virtual std::unique_ptr<DoglegPasses> make_dogleg(const Columns& columns, bool points_held);
+  virtual std::unique_ptr<DoglegSource> make_dogleg();
 
   virtual std::uint64_t bytes() const = 0;  ///< held beside arrangement and state
 };

@@ -18,7 +18,7 @@ constexpr double kRounding = 1.1e-16, kFloatRounding = 6e-8;
 
 }  // namespace
 
-std::unique_ptr<DoglegPasses> PointRows::make_dogleg(const Columns&, bool) { return {}; }
+std::unique_ptr<DoglegSource> PointRows::make_dogleg() { return {}; }
 
 PointSystem::PointSystem(std::unique_ptr<PointRows> rows, Start start, const Numbering& columns,
                          const PointRules& rules, const Plan& plan, const Kernels& kernels,
@@ -55,7 +55,8 @@ void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const K
     case SolverKind::dense:
       return stage_.set_solver(make_dense_solver(columns_, kernels, threads_));
     case SolverKind::sparse:
-      return stage_.set_solver(make_sparse_solver(columns_, chunks, kernels, threads_));
+      return stage_.set_solver(
+          make_sparse_solver(columns_, chunks, kernels, threads_, plan.analysis));
     case SolverKind::explicit_cg:
       return stage_.set_solver(
           make_explicit_solver(columns_, chunks, plan.mixed, kernels, threads_));

@@ -203,7 +203,8 @@ void expect_step_within_radius(const Problem& start, const Case& c) {
   for (double share : {2.0, 0.8, 0.4, 0.1, 1e-2, 1e-4})
     for (bool at_once : {false, true}) {
       const double radius = share * path.newton().norm();
-      SCOPED_TRACE(testing::Message() << static_cast<int>(c.solver) << " " << share << " " << at_once);
+      SCOPED_TRACE(testing::Message()
+                   << static_cast<int>(c.solver) << " " << share << " " << at_once);
       Engine engine(start, c);
       if (!at_once) {
         engine.propose(kUnbounded);
@@ -231,7 +232,8 @@ TEST(Dogleg, EverySolverKeepsWithinTheRadiusAndItsPromise) {
   Fixed singles;
   singles.pose_ids = {1, 4};
   for (CameraSolverKind solver :
-       {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit, CameraSolverKind::iterative_implicit}) {
+       {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+        CameraSolverKind::iterative_implicit}) {
     expect_step_within_radius(problem, {{}, {}, solver});
     expect_step_within_radius(problem, {{}, {}, solver, 1e-2});
     expect_step_within_radius(problem, {{}, {LossKind::huber, 0.5}, solver});
@@ -317,7 +319,8 @@ const Kernels& counting_kernels() {
 
 TEST(Dogleg, ASmallerRadiusNeedsNoNewLinearization) {
   for (CameraSolverKind solver :
-       {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit, CameraSolverKind::iterative_implicit}) {
+       {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+        CameraSolverKind::iterative_implicit}) {
     const Problem problem = small_scene().start;
     Engine engine(problem, {{}, {}, solver, 1e-6}, counting_kernels());
     linearized = 0;

@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "systems/float_operator.h"
+#include "systems/bal_operators.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,33 @@
 #include "reduced/scaling.h"
 
 namespace sheaf {
-FloatImplicitOperator::FloatImplicitOperator(const Columns& columns, const HeldState& state,
-                                             const Kernels& kernels, ProductSums& sums)
+
+BalOperator::BalOperator(const Columns& columns, const BalState& state, const Kernels& kernels,
+                         Threads& threads)
+    : state_(state),
+      kernels_(kernels),
+      sums_(*state.chunks, columns.num_images(), product_scratch_doubles(*state.batches), threads) {
+}
+
+void BalOperator::apply(const double* x, double* y) {
+  for (std::size_t i = 0; i < sums_.num_blocks(); ++i)
+    camera_record::write_step(state_.record(i) + camera_record::kFocal, x + kImageVector * i,
+                              state_.record(i) + camera_record::kStep);
+  const ProductInput in = state_.input();
+  sums_.run([&](const Chunk& chunk, double* saved,
+                double* sums) { kernels_.product(in, chunk, saved, sums); },
+            [&](std::size_t i, const double* total) {
+              read_product(state_.record(i) + camera_record::kFocal, total, y + kImageVector * i);
+            });
+}
+
+void BalDogleg::write_step(std::size_t image, const double* x) {
+  double* record = state_.record(image);
+  camera_record::write_step(record + camera_record::kFocal, x, record + camera_record::kStep);
+}
+
+FloatBalOperator::FloatBalOperator(const Columns& columns, const BalState& state,
+                                   const Kernels& kernels, ProductSums& sums)
     : columns_(columns),
       state_(state),
       kernels_(kernels),
@@ -21,7 +46,7 @@ FloatImplicitOperator::FloatImplicitOperator(const Columns& columns, const HeldS
 
 /// The origin is the mean of the camera centres -R^T t, the unit of length the mean of |P.xyz| of
 /// the cameras about it: both in fixed order.
-void FloatImplicitOperator::prepare(const double* squares) {
+void FloatBalOperator::prepare(const double* squares) {
   squares_ = squares;
   const double* records = state_.cameras->data();
   double sum[3] = {0, 0, 0};
@@ -42,7 +67,7 @@ void FloatImplicitOperator::prepare(const double* squares) {
     length += std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
   }
   scale_ = towards_one(length / static_cast<double>(images_));
-  sums_.for_each_image([&](std::size_t i) {
+  sums_.for_each_block([&](std::size_t i) {
     const double* R = records + kCameraRecord * i;
     float* to = &cameras_[kFloatCameraRecord * i];
     double t[3];
@@ -56,7 +81,7 @@ void FloatImplicitOperator::prepare(const double* squares) {
 }
 
 /// x scaled by its columns is what the residuals see of it, at most in pixels: next to 1.
-double FloatImplicitOperator::scale_of_step(const double* x) const {
+double FloatBalOperator::scale_of_step(const double* x) const {
   double most = 0;
   for (std::size_t i = 0; i < images_; ++i)
     for (int k = 0; k < 9; ++k)
@@ -65,9 +90,9 @@ double FloatImplicitOperator::scale_of_step(const double* x) const {
   return towards_one(most);
 }
 
-void FloatImplicitOperator::apply(const double* x, double* y) {
+void FloatBalOperator::apply(const double* x, double* y) {
   const double scale = scale_of_step(x);
-  sums_.for_each_image([&](std::size_t i) { write_step(x + kImageVector * i, scale, i); });
+  sums_.for_each_block([&](std::size_t i) { write_step(x + kImageVector * i, scale, i); });
   const FloatProductInput in{state_.batches,
                              cameras_.data(),
                              state_.points->data(),
@@ -86,7 +111,7 @@ void FloatImplicitOperator::apply(const double* x, double* y) {
       });
 }
 
-void FloatImplicitOperator::write_step(const double* x, double scale, std::size_t image) {
+void FloatBalOperator::write_step(const double* x, double scale, std::size_t image) {
   double step[9];
   camera_record::write_step(state_.cameras->data() + kCameraRecord * image + camera_record::kFocal,
                             x, step);
@@ -94,7 +119,5 @@ void FloatImplicitOperator::write_step(const double* x, double scale, std::size_
   float* to = &cameras_[kFloatCameraRecord * image + camera_record::kStep];
   for (int k = 0; k < 9; ++k) to[k] = static_cast<float>(scale * step[k]);
 }
-
-std::uint64_t FloatImplicitOperator::bytes() const { return cameras_.bytes(); }
 
 }  // namespace sheaf
