@@ -120,7 +120,8 @@ std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tr
 }
 
 const LensKernels& lens_kernels(const char* simd_name) {
-  [[maybe_unused]] const std::string_view name = simd_name;
+  const std::string_view name = simd_name;
+  if (name == "scalar") return reference_lens_kernels();
 #if HWY_TARGETS & HWY_AVX3
   static const LensKernels avx512 = N_AVX3::lens_table("avx512");
   if (name == avx512.name) return avx512;

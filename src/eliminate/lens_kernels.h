@@ -106,7 +106,10 @@ struct LensKernels {
   void (*residuals)(const LensInput&, const Chunk&, double* out);
 };
 
-/// simd_name: as of Kernels.
+/// Plain scalar code, one observation at a time: the twin that the others are tested against.
+const LensKernels& reference_lens_kernels();
+
+/// simd_name: as of Kernels; "scalar" gives the reference.
 const LensKernels& lens_kernels(const char* simd_name);
 
 }  // namespace sheaf

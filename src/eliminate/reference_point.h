@@ -1,0 +1,135 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "eliminate/kernels.h"
+#include "eliminate/reference_rows.h"
+
+namespace sheaf {
+
+// What the reference kernels of lenses and of kept rows share: the elimination of one point whose
+// observations' rows are known, whatever they are rows of.
+
+/// An observation's residual and its derivatives by the nine columns of the camera block and by the
+/// point.
+struct PointRow {
+  std::array<double, 2> r{};
+  std::array<std::array<double, 9>, 2> camera{};
+  std::array<std::array<double, 3>, 2> point{};
+
+  double square() const { return r[0] * r[0] + r[1] * r[1]; }
+  void scale(double by) {
+    for (std::size_t e = 0; e < 2; ++e) {
+      r[e] *= by;
+      for (double& x : camera[e]) x *= by;
+      for (double& x : point[e]) x *= by;
+    }
+  }
+};
+
+/// Normal equations of a point: V = sum Jp^T Jp, g = -sum Jp^T r.
+struct PointNormal {
+  Matrix3<double> V{};
+  Vector3<double> g{};
+
+  void add(const PointRow& row) {
+    for (std::size_t e = 0; e < 2; ++e)
+      for (std::size_t i = 0; i < 3; ++i) {
+        g[i] -= row.point[e][i] * row.r[e];
+        for (std::size_t k = 0; k < 3; ++k) V[3 * i + k] += row.point[e][i] * row.point[e][k];
+      }
+  }
+};
+
+/// V + D = L L^T with D = lambda diag(V), clamped, and w = L^-1 g; a point that is held has
+/// L^-1 = 0 and D = 0.
+struct EliminatedPoint {
+  Factor3 f;
+  Vector3<double> w{}, D{};
+
+  EliminatedPoint(const PointNormal& p, double lambda, bool held) {
+    Matrix3<double> A = p.V;
+    for (std::size_t i = 0; i < 3; ++i) {
+      D[i] = held ? 0 : lambda * std::clamp(p.V[4 * i], kDiagonalFloor, kDiagonalCeiling);
+      A[4 * i] += D[i];
+    }
+    if (!held) f = Factor3::of(A);
+    f.held = held;
+    w = f.forward(p.g.data());
+  }
+  double decrease() const { return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]; }
+  /// To a lane of kFactorGroup.
+  void store(double* out) const {
+    std::array<double, 12> all{1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22,
+                               w[0],      w[1],  w[2],  D[0],      D[1],  D[2]};
+    if (f.held) all.fill(0);
+    for (std::size_t i = 0; i < 12; ++i) out[8 * i] = all[i];
+  }
+};
+
+/// An observation seen through the point's elimination: B = Jp L^-T, M = I - B B^T = Lm Lm^T, and
+/// h = Lm^-1 (r + B w).
+struct WhitenedRow {
+  std::array<Vector3<double>, 2> B;
+  double l00, l10, l11;
+  std::array<double, 2> h;
+
+  WhitenedRow(const PointRow& row, const EliminatedPoint& p) {
+    for (std::size_t e = 0; e < 2; ++e) B[e] = p.f.forward(row.point[e].data());
+    std::array<double, 2> q = row.r;
+    double m00 = 1, m01 = 0, m11 = 1;
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t e = 0; e < 2; ++e) q[e] += B[e][i] * p.w[i];
+      m00 -= B[0][i] * B[0][i], m01 -= B[0][i] * B[1][i], m11 -= B[1][i] * B[1][i];
+    }
+    l00 = std::sqrt(std::max(m00, 1e-20));
+    l10 = m01 / l00;
+    l11 = std::sqrt(std::max(m11 - l10 * l10, 1e-20));
+    h = times_inverse(q);
+  }
+  /// Lm^T j.
+  std::array<double, 2> times_transpose(double j0, double j1) const {
+    return {l00 * j0 + l10 * j1, l11 * j1};
+  }
+  /// Lm^-1 q.
+  std::array<double, 2> times_inverse(const std::array<double, 2>& q) const {
+    const double first = q[0] / l00;
+    return {first, (q[1] - l10 * first) / l11};
+  }
+};
+
+/// Entry k of column c of a T record: rows 0..7 of the three columns, then row 8 of each.
+inline double& t_entry(double* T, int c, int k) { return k < 8 ? T[8 * c + k] : T[24 + c]; }
+inline double t_entry(const double* T, int c, int k) { return k < 8 ? T[8 * c + k] : T[24 + c]; }
+/// Entry k of row e of a C record, the ninths of which stand in T; and where h is.
+constexpr int kNinthOfC = 28, kPlaceOfH = 30;
+
+/// T = Jc^T B, C = Lm^T Jc and h, as records have them.
+inline void write_point_records(const PointRow& row, const WhitenedRow& m, double* T, double* C) {
+  for (int k = 0; k < 9; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double j0 = row.camera[0][i], j1 = row.camera[1][i];
+    for (int c = 0; c < 3; ++c)
+      t_entry(T, c, k) = j0 * m.B[0][std::size_t(c)] + j1 * m.B[1][std::size_t(c)];
+    const std::array<double, 2> column = m.times_transpose(j0, j1);
+    for (int e = 0; e < 2; ++e) (k < 8 ? C[8 * e + k] : T[kNinthOfC + e]) = column[std::size_t(e)];
+  }
+  T[27] = 0;
+  T[kPlaceOfH] = m.h[0], T[kPlaceOfH + 1] = m.h[1];
+}
+
+/// Where entry (i, k) of a 9 x 9 sum stands: in the square, in row 8 or column 8 beside it, or in
+/// the corner. Diagonal blocks have no column 8, as they are symmetric.
+constexpr int tile_entry(int i, int k) {
+  return i < 8 && k < 8 ? 8 * i + k : i == 8 && k == 8 ? 80 : i == 8 ? 64 + k : 72 + i;
+}
+constexpr int kNoEntry = -1;
+constexpr int block_entry(int i, int k) { return k < 8 ? 8 * i + k : i == 8 ? 88 : kNoEntry; }
+constexpr int block_right_side(int i) { return i < 8 ? 72 + i : 89; }
+constexpr int block_squares(int i) { return i < 8 ? 80 + i : 90; }
+
+}  // namespace sheaf
