@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "eliminate/close_sums.h"
 #include "eliminate/kernel_table.h"
 #include "geometry/rotation.h"
 #include "lists/lens_chunks.h"
@@ -23,7 +24,11 @@ namespace sheaf {
 namespace {
 
 using test::all_models;
+using test::column_size;
 using test::disturbed;
+using test::expect_close;
+using test::expect_same_diagonal;
+using test::expect_same_tiles;
 using test::mixtures;
 using test::nothing_held;
 using test::ordinary;
@@ -64,18 +69,12 @@ class LensProblem {
   /// Blocks of lenses, without records.
   bool sums_at_once() const { return layout_.jacobians > layout_.blocks; }
   Outcome run(const LensKernels& kernels) const;
-  /// The size of a column as its block has it: by the squares with and without points.
-  static double unit(const Outcome& of, std::size_t block, int column) {
-    const double* d = &of.diagonal[kDiagonalDoubles * block];
-    return std::sqrt(column < 8 ? d[9 * column] + d[80 + column] : d[88] + d[90]);
-  }
   void expect_agreement(const LensKernels& kernels, const Outcome& expected, double slack) const;
 
  private:
   void write_states(const Problem& problem);
   void eliminate(const LensKernels& kernels, Outcome& out) const;
   void multiply(const LensKernels& kernels, Outcome& out) const;
-  void expect_same_blocks(const Outcome& got, const Outcome& expected, double tolerance) const;
   LensState held() const { return {images_.data(), lenses_.data(), points_.data()}; }
   LensState tried() const { return {tried_images_.data(), tried_lenses_.data(), nullptr}; }
   LensInput input() const { return {&arranged_.batches, &arranged_.tracks, held()}; }
@@ -156,7 +155,7 @@ void LensProblem::multiply(const LensKernels& kernels, Outcome& out) const {
   x.fill(0), saved.fill(std::nan(""));
   for (std::size_t b = 0; b < tracks.num_blocks; ++b)
     for (int k = 0; k < 9; ++k)
-      if (const double size = unit(out, b, k); size > 0)
+      if (const double size = column_size(out.diagonal, b, k); size > 0)
         x[kProductRecord * b + std::size_t(k)] = std::sin(double(9 * b) + k) / size;
   const LensProductInput in{input(), out.factors.data(), out.weights.data(), x.data()};
   for (const Chunk& chunk : chunks_.chunks.chunks)
@@ -202,60 +201,25 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
   return out;
 }
 
-/// Entry by entry, each against the sizes of its row and its column.
-void LensProblem::expect_same_blocks(const Outcome& got, const Outcome& expected,
-                                     double tolerance) const {
-  const double residual = std::sqrt(expected.eliminated.square_sum);
-  for (std::size_t b = 0; b < arranged_.tracks.num_blocks; ++b)
-    for (int i = 0; i < 91; ++i) {
-      const int row = i < 64   ? i / 8
-                      : i < 72 ? 8
-                      : i < 88 ? i % 8
-                               : 8,
-                column = i < 72 ? i % 8 : row;
-      const bool right_side = (i >= 72 && i < 80) || i == 89;
-      const double of_row = unit(expected, b, row),
-                   size = of_row * (right_side ? residual : unit(expected, b, column));
-      const std::size_t at = kDiagonalDoubles * b + std::size_t(i);
-      ASSERT_NEAR(got.diagonal[at], expected.diagonal[at], tolerance * size) << b << ", " << i;
-    }
-  const std::vector<Tile>& tiles = chunks_.chunks.tiles;
-  for (std::size_t t = 0; t < tiles.size(); ++t)
-    for (int i = 0; i < 81; ++i) {
-      const int row = i < 64 ? i / 8 : i < 72 ? 8 : i < 80 ? i - 72 : 8;
-      const int column = i < 72 ? i % 8 : 8;
-      const double size =
-          unit(expected, tiles[t].row, row) * unit(expected, tiles[t].column, column);
-      const std::size_t at = kTileDoubles * t + std::size_t(i);
-      ASSERT_NEAR(got.tiles[at], expected.tiles[at], tolerance * size)
-          << "tile of " << tiles[t].row << " and " << tiles[t].column << ", " << i;
-    }
-  for (std::size_t b = 0; b < arranged_.tracks.num_blocks; ++b)
-    for (int k = 0; k < 9; ++k) {
-      const std::size_t at = kProductRecord * b + std::size_t(k);
-      ASSERT_NEAR(got.product[at], expected.product[at], 10 * tolerance * unit(expected, b, k))
-          << "product, block " << b << ", " << k;
-    }
-}
-
-void expect_close(const Buffer<double>& a, const Buffer<double>& b, double tolerance,
-                  const std::string& what) {
-  ASSERT_EQ(a.size(), b.size());
-  double scale = 0;
-  for (double x : b) scale = std::max(scale, std::abs(x));
-  for (std::size_t i = 0; i < a.size(); ++i)
-    ASSERT_NEAR(a[i], b[i], tolerance * (std::abs(b[i]) + 1e-3 * scale)) << what << " " << i;
-}
-
 void LensProblem::expect_agreement(const LensKernels& kernels, const Outcome& expected,
                                    double slack) const {
   SCOPED_TRACE(kernels.name);
   const Outcome got = run(kernels);
-  expect_same_blocks(got, expected, slack * 1e-10);
-  expect_close(got.factors, expected.factors, slack * 1e-10, "factor");
+  const double tolerance = slack * 1e-10;
+  expect_same_diagonal(got.diagonal, expected.diagonal, std::sqrt(expected.eliminated.square_sum),
+                       tolerance);
+  expect_same_tiles(got.tiles, expected.tiles, chunks_.chunks.tiles, expected.diagonal, tolerance);
+  for (std::size_t b = 0; b < arranged_.tracks.num_blocks; ++b)
+    for (int k = 0; k < 9; ++k) {
+      const std::size_t at = kProductRecord * b + std::size_t(k);
+      ASSERT_NEAR(got.product[at], expected.product[at],
+                  10 * tolerance * column_size(expected.diagonal, b, k))
+          << "product, block " << b << ", " << k;
+    }
+  expect_close(got.factors, expected.factors, tolerance, "factor");
   expect_close(got.weights, expected.weights, 1e-10, "weight");
   expect_close(got.residuals, expected.residuals, 1e-10, "residual");
-  expect_close(got.trial_points, expected.trial_points, slack * 1e-10, "trial point");
+  expect_close(got.trial_points, expected.trial_points, tolerance, "trial point");
   const auto near = [slack](double a, double b) { EXPECT_NEAR(a, b, slack * 1e-10 * std::abs(b)); };
   near(got.eliminated.square_sum, expected.eliminated.square_sum);
   near(got.eliminated.loss_sum, expected.eliminated.loss_sum);
