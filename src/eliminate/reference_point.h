@@ -8,28 +8,12 @@
 
 #include "eliminate/kernels.h"
 #include "eliminate/reference_rows.h"
+#include "rows/reference_row.h"
 
 namespace sheaf {
 
 // What the reference kernels of lenses and of kept rows share: the elimination of one point whose
 // observations' rows are known, whatever they are rows of.
-
-/// An observation's residual and its derivatives by the nine columns of the camera block and by the
-/// point.
-struct PointRow {
-  std::array<double, 2> r{};
-  std::array<std::array<double, 9>, 2> camera{};
-  std::array<std::array<double, 3>, 2> point{};
-
-  double square() const { return r[0] * r[0] + r[1] * r[1]; }
-  void scale(double by) {
-    for (std::size_t e = 0; e < 2; ++e) {
-      r[e] *= by;
-      for (double& x : camera[e]) x *= by;
-      for (double& x : point[e]) x *= by;
-    }
-  }
-};
 
 /// Normal equations of a point: V = sum Jp^T Jp, g = -sum Jp^T r.
 struct PointNormal {

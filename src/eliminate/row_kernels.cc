@@ -248,7 +248,7 @@ namespace sheaf {
 
 const RowKernels& row_kernels(const char* simd_name) {
   const std::string_view name = simd_name;
-  (void)name;
+  if (name == "scalar") return reference_row_kernels();
 #if HWY_TARGETS & HWY_AVX3
   static const RowKernels avx512 = N_AVX3::row_table("avx512");
   if (name == avx512.name) return avx512;

@@ -51,7 +51,10 @@ struct RowKernels {
   /// Back-substitutes the chunk's points into out.points; adds to out.damping_term, out.step2_max.
   void (*back_substitute)(const RowTrialInput&, const Chunk&, TrialOutput& out);
 };
-/// simd_name: as of Kernels.
+/// Plain scalar code, one observation at a time: the twin that the others are tested against.
+const RowKernels& reference_row_kernels();
+
+/// simd_name: as of Kernels; "scalar" gives the reference.
 const RowKernels& row_kernels(const char* simd_name);
 
 }  // namespace sheaf

@@ -131,6 +131,12 @@ constexpr std::size_t kBrightnessBatch = 5 * 8;
 /// that the patch was read at they are its rows, in a fifth of the room.
 constexpr std::size_t patch_factors(bool brightness) { return (brightness ? 9 : 5) * 8; }
 
+/// Squared slopes of a patch, summed, below which there is no texture: where an image is saturated
+/// they are some 1e-28, and points that see nothing else would step by noise over noise.
+constexpr double kNoTexture = 1e-12;
+/// And what is left of those along y when those along x are known, by their sum, that is rounding.
+constexpr double kRoundedPivot = 1e-12;
+
 /// What is nullptr is not written.
 struct PhotometricOutput {
   double* rows;        ///< kRowBatch per batch
@@ -153,6 +159,8 @@ struct PhotometricKernels {
   void (*collapse)(const PhotometricInput&, std::uint32_t first, std::uint32_t end,
                    PhotometricOutput& out);
 };
+/// simd_name: as of Kernels (eliminate/kernels.h); "scalar" gives plain scalar code, one pixel at a
+/// time, the twin that the others are tested against (rows/reference_patch.h).
 const PhotometricKernels& photometric_kernels(const char* simd_name);
 
 }  // namespace sheaf

@@ -6,6 +6,7 @@
 #include "platform/buffer.h"
 #include "platform/simd_targets.h"
 #include "rows/photometric.h"
+#include "rows/reference_patch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "rows/photometric_kernels.cc"
@@ -26,10 +27,6 @@ namespace HWY_NAMESPACE {
 
 static_assert(kRowBatch == kJacobianFields * kLanes * kParts);
 
-/// Squared slopes of a patch, summed, below which there is no texture: where an image is saturated
-/// they are some 1e-28, and points that see nothing else would step by noise over noise.
-constexpr double kNoTexture = 1e-12;
-
 template <bool kBrightness>
 HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
   Whitened w;
@@ -40,7 +37,7 @@ HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
   w.r12 = hn::Mul(sums[kGxy], i1);
   w.h[0] = hn::Mul(sums[kGxr], i1);
   const V left = fnma(w.r12, w.r12, sums[kGyy]);
-  const auto second = hn::Gt(left, fma(set(1e-12), sums[kGyy], set(kNoTexture)));
+  const auto second = hn::Gt(left, fma(set(kRoundedPivot), sums[kGyy], set(kNoTexture)));
   const V i2 = hn::IfThenElse(second, hn::Div(set(1.0), hn::Sqrt(left)), none);
   w.r22 = hn::Mul(left, i2);
   w.h[1] = hn::Mul(fnma(w.r12, w.h[0], sums[kGyr]), i2);
@@ -222,7 +219,8 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const PhotometricKernels& photometric_kernels(const char* simd_name) {
-  [[maybe_unused]] const std::string_view name = simd_name;
+  const std::string_view name = simd_name;
+  if (name == "scalar") return reference_photometric_kernels();
 #if HWY_TARGETS & HWY_AVX3
   static const PhotometricKernels avx512 = N_AVX3::photometric_table("avx512");
   if (name == avx512.name) return avx512;

@@ -22,4 +22,7 @@ constexpr std::size_t first_row_field(int lanes, int lane) {
   return static_cast<std::size_t>(lane / lanes * row_field::kCount * lanes + lane % lanes);
 }
 
+/// The reference kernels keep the rows of each lane together.
+constexpr int kReferenceLanes = 1;
+
 }  // namespace sheaf
