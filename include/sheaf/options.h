@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "sheaf/camera_solver_kind.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
 #include "sheaf/stop.h"
@@ -30,16 +31,6 @@ enum class PointParametrisation {
 
 /// Instruction set of the hot kernels.
 enum class Simd { best, scalar, sse4, avx2, avx512 };
-
-/// How the reduced camera system is solved.
-enum class CameraSolverKind {
-  automatic,           ///< the cheapest by counted flops and bytes
-  dense,               ///< formed, dense Cholesky
-  sparse,              ///< formed by blocks, sparse Cholesky
-  iterative,           ///< conjugate gradients, explicit or implicit by counted flops and bytes
-  iterative_explicit,  ///< conjugate gradients on the formed blocks
-  iterative_implicit,  ///< conjugate gradients, nothing formed: Jacobians recomputed
-};
 
 /// What bounds a step that the cost did not follow.
 enum class TrustRegion {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sheaf/camera_solver_kind.h"
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
@@ -142,6 +143,8 @@ struct PhotometricOptions {
   int levels = 1;  ///< of the pyramid
   bool fix_poses = false, fix_points = false;
   PatchRows rows = PatchRows::shared;
+  /// Automatic: dense while the factor costs about as much as the pixels, then sparse.
+  CameraSolverKind solver = CameraSolverKind::automatic;
   /// Standard deviation of the problem's measured positions, pixels of the full image. They cost
   ///   sigma^2 / 2 sum rho(|u - measured|^2 / anchor_px^2)
   /// beside the patches, sigma being a pixel's standard deviation in grey levels, estimated anew at

@@ -77,6 +77,7 @@ class Refinement {
     out.loss_per_patch = options_.loss_per_patch;
     out.leaving_is_free = options_.leaving == Leaving::free;
     out.exact_rows = options_.rows == PatchRows::exact;
+    out.solver = options_.solver;
     return out;
   }
 

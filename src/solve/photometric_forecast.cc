@@ -138,9 +138,9 @@ SceneBytes scene_bytes(const PhotometricProblem& problem, const PhotometricOptio
 /// stored: some points' rows are not those of one patch for each observation.
 std::uint64_t system_bytes(const Counts& c, const PhotometricOptions& options, bool stored,
                            int threads) {
-  const bool dense = c.work.columns <= PhotometricSystem::kMostDenseColumns;
-  std::uint64_t bytes =
-      forecast_bytes(c.work, {dense ? SolverKind::dense : SolverKind::sparse, ""}, threads);
+  const SolverKind kind =
+      PhotometricSystem::kind_of(options.solver, static_cast<std::int32_t>(c.work.columns));
+  std::uint64_t bytes = forecast_bytes(c.work, {kind, ""}, threads);
   const auto add = [&](std::uint64_t doubles, std::uint64_t copies = 1) {
     bytes += copies * resident_bytes_of(8 * doubles);
   };

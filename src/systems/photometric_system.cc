@@ -6,6 +6,23 @@
 
 namespace sheaf {
 
+SolverKind PhotometricSystem::kind_of(CameraSolverKind asked, std::int32_t columns) {
+  switch (asked) {
+    case CameraSolverKind::dense:
+      return SolverKind::dense;
+    case CameraSolverKind::sparse:
+      return SolverKind::sparse;
+    case CameraSolverKind::iterative:
+    case CameraSolverKind::iterative_explicit:
+      return SolverKind::explicit_cg;
+    case CameraSolverKind::iterative_implicit:
+      return SolverKind::implicit_cg;
+    case CameraSolverKind::automatic:
+      break;
+  }
+  return columns <= kMostDenseColumns ? SolverKind::dense : SolverKind::sparse;
+}
+
 PhotometricSystem::Parts PhotometricSystem::make(const PatchScene& scene, const PatchState& state,
                                                  const std::vector<Sight>& sights,
                                                  const PhotometricRules& rules,
@@ -17,7 +34,9 @@ PhotometricSystem::Parts PhotometricSystem::make(const PatchScene& scene, const 
   for (const Pose& pose : state.poses) cameras.poses.push_back({pose.rotation, pose.translation});
   for (const Brightness& of : state.brightness) cameras.sets.push_back({of.a, of.b});
   const Columns& columns = rows->columns();
-  Plan plan{columns.count <= kMostDenseColumns ? SolverKind::dense : SolverKind::sparse, ""};
+  Plan plan{kind_of(rules.solver, columns.count), ""};
+  if (plan.kind == SolverKind::explicit_cg && rows->blocks_are_images() && !rules.points_held)
+    plan.clusters = coarse_clusters(rows->batches(), rows->pose_columns(), threads);
   Start start{std::move(cameras), CameraColumns::of_brightness(columns), &state.points};
   PixelRows* const pixels = rows.get();
   return {std::move(rows), pixels, std::move(start), {rules.points_held}, std::move(plan)};
@@ -33,8 +52,8 @@ PhotometricSystem::PhotometricSystem(const PatchScene& scene, const PatchState& 
 PhotometricSystem::PhotometricSystem(Parts parts, const PatchState& state, const Kernels& kernels,
                                      Threads& threads)
     : PointSystem(std::move(parts.rows), std::move(parts.start),
-                  {&parts.pixels->columns(), &parts.pixels->columns()}, parts.rules, parts.plan,
-                  kernels, threads),
+                  {&parts.pixels->columns(), &parts.pixels->pose_columns()}, parts.rules,
+                  parts.plan, kernels, threads),
       pixels_(*parts.pixels),
       kind_(parts.plan.kind),
       initial_points_(state.points) {}

@@ -16,6 +16,9 @@ class PhotometricSystem : public PointSystem {
   /// Dense up to where its factor costs about as much as the patches' pixels; then by blocks.
   static constexpr std::int32_t kMostDenseColumns = 1200;
 
+  /// The solver asked for, or by this rule.
+  static SolverKind kind_of(CameraSolverKind asked, std::int32_t columns);
+
   /// As PixelRows. Throws std::bad_alloc.
   PhotometricSystem(const PatchScene& scene, const PatchState& state,
                     const std::vector<Sight>& sights, const PhotometricRules& rules,

@@ -89,6 +89,9 @@ PixelRows::PixelRows(const PatchScene& scene, const std::vector<Sight>& sights, 
       image_chunks_(
           only_tiles(blocks_.are_pairs() ? blocks_.image_tiles(chunks_.tiles) : chunks_.tiles)),
       columns_(number_columns(scene.num_images(), rules)) {
+  pose_columns_ = columns_;
+  for (std::size_t i = 0; i < pose_columns_.of_image.size(); ++i)
+    if (i % kCameraColumns >= 6) pose_columns_.of_image[i] = Columns::kFixed;
   if (mixed_) patch_chunks_ = cut_into_chunks(batches_, blocks_.count(), ChunkLists::none);
   const std::size_t images = scene.num_images();
   allocate(held_);

@@ -22,6 +22,7 @@ struct PhotometricRules {
   bool loss_per_patch = false;
   bool leaving_is_free = false;
   bool exact_rows = false;  ///< where patches are warped
+  CameraSolverKind solver = CameraSolverKind::automatic;
 };
 
 /// Rows of pixels: patches collapse to two rows each, from there on points are eliminated and
@@ -40,6 +41,10 @@ class PixelRows : public PointRows {
             const PhotometricRules& rules, const Kernels& kernels, Threads& threads, Anchor anchor);
 
   const Columns& columns() const { return columns_; }
+  /// Those of poses, which a coarse space moves.
+  const Columns& pose_columns() const { return pose_columns_; }
+  /// Whether a block is an image; else a pair of them, whose records a coarse space cannot take.
+  bool blocks_are_images() const { return !blocks_.are_pairs(); }
   /// Patches outside of their image at the held state.
   std::uint64_t left() const { return totals_.left; }
 
@@ -107,7 +112,7 @@ class PixelRows : public PointRows {
   Chunks chunks_;                     ///< of the rows
   Chunks patch_chunks_;               ///< empty where the patches' are the rows'
   Chunks image_chunks_;               ///< tiles of images alone: what the camera solver sees
-  Columns columns_;
+  Columns columns_, pose_columns_;
   const SteppedState* state_ = nullptr;
 
   Half held_, tried_;

@@ -1,0 +1,57 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// Photometric problems by every camera solver: the same minimum.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "sheaf/sheaf.h"
+
+namespace sheaf {
+namespace {
+
+PhotometricScene forty_images() {
+  PhotometricSceneOptions options;
+  options.images = 40;
+  options.points = 400;
+  options.width = 96;
+  options.height = 72;
+  options.brightness = 0.05;
+  options.noise_grey = 1;
+  options.start_px = 0.4;
+  return generate(options).value();
+}
+
+PhotometricOptions options_of(CameraSolverKind solver) {
+  PhotometricOptions options;
+  options.solver = solver;
+  options.tolerance = 1e-12;
+  options.motion_px = 1e-6;
+  options.max_iterations = 60;
+  options.rounds = 1;
+  options.loss = Huber{20};
+  return options;
+}
+
+double final_cost(const PhotometricProblem& start, const PhotometricOptions& options,
+                  const std::string& solver) {
+  PhotometricProblem problem = start;
+  const PhotometricSummary summary = refine_photometric(problem, options).value();
+  EXPECT_EQ(summary.solve.solver, solver);
+  return summary.solve.final_cost;
+}
+
+TEST(PhotometricSolvers, ConjugateGradientsEndWhereDenseDoes) {
+  const PhotometricScene scene = forty_images();
+  const double dense = final_cost(scene.start, options_of(CameraSolverKind::dense), "dense");
+  for (const auto& [solver, name] :
+       {std::pair{CameraSolverKind::sparse, "sparse"},
+        std::pair{CameraSolverKind::iterative_explicit, "iterative-explicit"}}) {
+    SCOPED_TRACE(name);
+    EXPECT_NEAR(final_cost(scene.start, options_of(solver), name), dense, 1e-9 * dense);
+  }
+}
+
+}  // namespace
+}  // namespace sheaf
