@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "eliminate/dogleg_kernels.cc"
@@ -130,8 +130,8 @@ double point_damping(const ProductInput& in, const Chunk& chunk) {
   return sum_parts(sums);
 }
 
-DoglegKernels dogleg_table(const char* name) {
-  return {name, &gradient, &curvature, &point_damping};
+constexpr DoglegKernels dogleg_table() {
+  return {set_name(HWY_TARGET), &gradient, &curvature, &point_damping};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -142,23 +142,10 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const DoglegKernels& dogleg_kernels(const char* simd_name) {
-  const std::string_view name = simd_name;
-  if (name == reference_dogleg_kernels().name) return reference_dogleg_kernels();
-#if HWY_TARGETS & HWY_AVX3
-  static const DoglegKernels avx512 = N_AVX3::dogleg_table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const DoglegKernels avx2 = N_AVX2::dogleg_table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const DoglegKernels sse4 = N_SSE4::dogleg_table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const DoglegKernels baseline =
-      HWY_STATIC_DISPATCH(dogleg_table)(HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline");
-  return baseline;
+  if (std::string_view(simd_name) == reference_dogleg_kernels().name)
+    return reference_dogleg_kernels();
+  static constexpr DoglegKernels tables[] = SHEAF_TABLES(dogleg_table);
+  return table_named(tables, simd_name);
 }
 
 }  // namespace sheaf

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "eliminate/image_kernels.cc"
@@ -145,7 +145,7 @@ inline void residuals(const double* batches, const ImageBatches::Piece& piece, c
     }
 }
 
-ImageKernels image_table(const char* name) { return {name, &sum, &residuals}; }
+constexpr ImageKernels image_table() { return {set_name(HWY_TARGET), &sum, &residuals}; }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sheaf
@@ -155,20 +155,8 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const ImageKernels& image_kernels(const char* name) {
-#if HWY_TARGETS & HWY_AVX3
-  static const ImageKernels avx512 = N_AVX3::image_table("avx512");
-  if (std::strcmp(name, avx512.name) == 0) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const ImageKernels avx2 = N_AVX2::image_table("avx2");
-  if (std::strcmp(name, avx2.name) == 0) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const ImageKernels sse4 = N_SSE4::image_table("sse4");
-  if (std::strcmp(name, sse4.name) == 0) return sse4;
-#endif
-  static const ImageKernels baseline = HWY_STATIC_DISPATCH(image_table)("baseline");
-  return baseline;
+  static constexpr ImageKernels tables[] = SHEAF_TABLES(image_table);
+  return table_named(tables, name);
 }
 
 }  // namespace sheaf

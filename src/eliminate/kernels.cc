@@ -3,7 +3,7 @@
 #include "eliminate/kernels.h"
 
 #include "eliminate/kernel_table.h"
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "eliminate/kernels.cc"
@@ -86,9 +86,19 @@ std::uint64_t count_behind(const Batches& batches, const double* cameras, const 
   return count_behind_chunk(batches, cameras, points, chunk);
 }
 
-Kernels table(const char* name, bool fused) {
-  return {name,   fused,    &linearize,     &diagonal,  &pairs,      &coarse,
-          &trial, &product, &product_float, &residuals, &square_sum, &count_behind};
+constexpr Kernels table() {
+  return {set_name(HWY_TARGET),
+          HWY_NATIVE_FMA != 0,
+          &linearize,
+          &diagonal,
+          &pairs,
+          &coarse,
+          &trial,
+          &product,
+          &product_float,
+          &residuals,
+          &square_sum,
+          &count_behind};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -118,24 +128,13 @@ Records records_in(double* scratch, const Chunks& chunks) {
 }
 
 std::vector<const Kernels*> available_kernels() {
+  static constexpr Kernels tables[] = SHEAF_TABLES(table);
   std::vector<const Kernels*> out;
-  const std::int64_t supported = hwy::SupportedTargets();
-#if HWY_TARGETS & HWY_AVX3
-  static const Kernels avx512 = N_AVX3::table("avx512", true);
-  if (supported & HWY_AVX3) out.push_back(&avx512);
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const Kernels avx2 = N_AVX2::table("avx2", true);
-  if (supported & HWY_AVX2) out.push_back(&avx2);
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const Kernels sse4 = N_SSE4::table("sse4", false);
-  if (supported & HWY_SSE4) out.push_back(&sse4);
-#endif
-  static const Kernels baseline =
-      HWY_STATIC_DISPATCH(table)(HWY_STATIC_TARGET == HWY_SCALAR ? "scalar" : "baseline", false);
-  out.push_back(&baseline);
-  (void)supported;
+  for (const Kernels& of : tables) {
+    const std::int64_t target = set_target(of.name);
+    if (target == HWY_STATIC_TARGET || (hwy::SupportedTargets() & target) == target)
+      out.push_back(&of);
+  }
   return out;
 }
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "eliminate/lens_kernels.cc"
@@ -73,9 +73,9 @@ void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
   }
 }
 
-LensKernels lens_table(const char* name) {
-  return {name,        &linearize_lenses,   &multiply_lenses, &multiply_poses,
-          &try_lenses, &multiply_by_lenses, &lens_residuals};
+constexpr LensKernels lens_table() {
+  return {set_name(HWY_TARGET), &linearize_lenses,   &multiply_lenses, &multiply_poses,
+          &try_lenses,          &multiply_by_lenses, &lens_residuals};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -120,22 +120,9 @@ std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tr
 }
 
 const LensKernels& lens_kernels(const char* simd_name) {
-  const std::string_view name = simd_name;
-  if (name == "scalar") return reference_lens_kernels();
-#if HWY_TARGETS & HWY_AVX3
-  static const LensKernels avx512 = N_AVX3::lens_table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const LensKernels avx2 = N_AVX2::lens_table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const LensKernels sse4 = N_SSE4::lens_table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const LensKernels baseline = HWY_STATIC_DISPATCH(lens_table)("baseline");
-  return baseline;
+  if (std::string_view(simd_name) == "scalar") return reference_lens_kernels();
+  static constexpr LensKernels tables[] = SHEAF_TABLES(lens_table);
+  return table_named(tables, simd_name);
 }
 
 }  // namespace sheaf

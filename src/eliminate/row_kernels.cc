@@ -5,7 +5,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "eliminate/row_kernels.cc"
@@ -235,8 +235,8 @@ void back_substitute_rows(const RowTrialInput& in, const Chunk& chunk, TrialOutp
   });
 }
 
-RowKernels row_table(const char* name) {
-  return {name, kLanes, &eliminate_rows, &pose_diagonal, &back_substitute_rows};
+constexpr RowKernels row_table() {
+  return {set_name(HWY_TARGET), kLanes, &eliminate_rows, &pose_diagonal, &back_substitute_rows};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -247,22 +247,9 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const RowKernels& row_kernels(const char* simd_name) {
-  const std::string_view name = simd_name;
-  if (name == "scalar") return reference_row_kernels();
-#if HWY_TARGETS & HWY_AVX3
-  static const RowKernels avx512 = N_AVX3::row_table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const RowKernels avx2 = N_AVX2::row_table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const RowKernels sse4 = N_SSE4::row_table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const RowKernels baseline = HWY_STATIC_DISPATCH(row_table)("baseline");
-  return baseline;
+  if (std::string_view(simd_name) == "scalar") return reference_row_kernels();
+  static constexpr RowKernels tables[] = SHEAF_TABLES(row_table);
+  return table_named(tables, simd_name);
 }
 
 }  // namespace sheaf

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reduced/block_rows.cc"
@@ -90,7 +90,9 @@ void multiply_float(const float* blocks, const std::uint32_t* image, std::size_t
   finish_row(sums, last, corner, y);
 }
 
-BlockRowKernels block_row_table(const char* name) { return {name, &multiply, &multiply_float}; }
+constexpr BlockRowKernels block_row_table() {
+  return {set_name(HWY_TARGET), &multiply, &multiply_float};
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sheaf
@@ -100,21 +102,8 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const BlockRowKernels& block_row_kernels(const char* simd_name) {
-  [[maybe_unused]] const std::string_view name = simd_name;
-#if HWY_TARGETS & HWY_AVX3
-  static const BlockRowKernels avx512 = N_AVX3::block_row_table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const BlockRowKernels avx2 = N_AVX2::block_row_table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const BlockRowKernels sse4 = N_SSE4::block_row_table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const BlockRowKernels baseline = HWY_STATIC_DISPATCH(block_row_table)("baseline");
-  return baseline;
+  static constexpr BlockRowKernels tables[] = SHEAF_TABLES(block_row_table);
+  return table_named(tables, simd_name);
 }
 
 }  // namespace sheaf

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reduced/dense_cholesky.cc"
@@ -184,8 +184,8 @@ void substitute(const double* A, std::size_t lda, std::size_t n, const double* i
     x[j] = (x[j] - dot_column(A + j * lda, x, j + 1, n)) * inverse[j];
 }
 
-DenseKernels table(const char* name) {
-  return {name, &factor_block, &solve_rows, &update, &product, &substitute};
+constexpr DenseKernels table() {
+  return {set_name(HWY_TARGET), &factor_block, &solve_rows, &update, &product, &substitute};
 }
 
 }  // namespace HWY_NAMESPACE
@@ -196,21 +196,8 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const DenseKernels& dense_kernels(const char* simd_name) {
-  [[maybe_unused]] const std::string_view name = simd_name;
-#if HWY_TARGETS & HWY_AVX3
-  static const DenseKernels avx512 = N_AVX3::table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const DenseKernels avx2 = N_AVX2::table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const DenseKernels sse4 = N_SSE4::table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const DenseKernels baseline = HWY_STATIC_DISPATCH(table)("baseline");
-  return baseline;
+  static constexpr DenseKernels tables[] = SHEAF_TABLES(table);
+  return table_named(tables, simd_name);
 }
 
 std::size_t DenseCholesky::leading(std::size_t n) {

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "platform/buffer.h"
-#include "platform/simd_targets.h"
+#include "platform/dispatch.h"
 #include "rows/photometric.h"
 #include "rows/reference_patch.h"
 
@@ -209,7 +209,7 @@ void collapse(const PhotometricInput& in, std::uint32_t first, std::uint32_t end
                                                                                    out);
 }
 
-PhotometricKernels photometric_table(const char* name) { return {name, &collapse}; }
+constexpr PhotometricKernels photometric_table() { return {set_name(HWY_TARGET), &collapse}; }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sheaf
@@ -219,22 +219,9 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 const PhotometricKernels& photometric_kernels(const char* simd_name) {
-  const std::string_view name = simd_name;
-  if (name == "scalar") return reference_photometric_kernels();
-#if HWY_TARGETS & HWY_AVX3
-  static const PhotometricKernels avx512 = N_AVX3::photometric_table("avx512");
-  if (name == avx512.name) return avx512;
-#endif
-#if HWY_TARGETS & HWY_AVX2
-  static const PhotometricKernels avx2 = N_AVX2::photometric_table("avx2");
-  if (name == avx2.name) return avx2;
-#endif
-#if HWY_TARGETS & HWY_SSE4
-  static const PhotometricKernels sse4 = N_SSE4::photometric_table("sse4");
-  if (name == sse4.name) return sse4;
-#endif
-  static const PhotometricKernels baseline = HWY_STATIC_DISPATCH(photometric_table)("baseline");
-  return baseline;
+  if (std::string_view(simd_name) == "scalar") return reference_photometric_kernels();
+  static constexpr PhotometricKernels tables[] = SHEAF_TABLES(photometric_table);
+  return table_named(tables, simd_name);
 }
 
 }  // namespace sheaf
