@@ -46,8 +46,8 @@ struct Bench {
       const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
       std::copy(R.begin(), R.end(), c);
       for (int d = 0; d < 3; ++d) {
-        c[9 + d] = problem.poses[i].translation[d];
-        c[12 + d] = problem.cameras[i].parameters[d];
+        c[camera_record::kTranslation + d] = problem.poses[i].translation[d];
+        c[camera_record::kFocal + d] = problem.cameras[i].parameters[d];
       }
       for (int d = 15; d < 24; ++d) c[d] = 1e-6;
     }

@@ -31,7 +31,7 @@ enum class CameraModel : std::uint8_t {
   eucm,                   ///< fx, fy, cx, cy, alpha, beta; sees more than 180 degrees
 };
 inline constexpr std::size_t kCameraModels = 13;
-inline constexpr std::size_t kMaxCameraParameters = 12;
+inline constexpr std::size_t kMaxCameraParameters = 16;
 
 /// Intrinsics of one lens.
 struct Camera {

@@ -25,10 +25,10 @@ HWY_INLINE void project(const double* T, const double* Z, double* H) {
   for (int part = 0; part < 8; part += kLanes) {
     V h[3];
     V z = load(Z + part);
-    for (int q = 0; q < 3; ++q) h[q] = hn::Mul(set(T[8 * q]), z);
+    for (int q = 0; q < 3; ++q) h[q] = hn::Mul(set(T[t_record::column(q)]), z);
     for (int r = 1; r < 7; ++r) {
       z = load(Z + 8 * r + part);
-      for (int q = 0; q < 3; ++q) h[q] = fma(set(T[8 * q + r]), z, h[q]);
+      for (int q = 0; q < 3; ++q) h[q] = fma(set(T[t_record::column(q) + r]), z, h[q]);
     }
     for (int q = 0; q < 3; ++q) store(h[q], H + 8 * q + part);
   }

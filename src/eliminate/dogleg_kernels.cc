@@ -33,8 +33,9 @@ void gradient(const ProductInput& in, const Chunk& chunk, double* sums) {
         const int lane = part * kLanes;
         const double* X = in.points + kPointGroup * g + lane;
         const double* z = &batches.xy[16 * b + lane];
-        V c[16], v[9];
-        load_cameras<2>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+        V c[8 * camera_record::kStateOctets], v[9];
+        load_cameras<camera_record::kStateOctets>(in.cameras, &batches.image[8 * b + lane],
+                                                  batches.uniform[b], c);
         const LaneJacobian j =
             linearize_lanes(c, load(X), load(X + 8), load(X + 16), load(z), load(z + 8), nullptr);
         const V w = hn::Neg(row_weight(in, b, lane, lane_mask(group.lanes, lane)));
@@ -83,10 +84,11 @@ HWY_INLINE void curvature_part(const CurvatureInput& in, std::size_t g, int part
     sums.gradient2[part] = fma(mask, square, sums.gradient2[part]);
   }
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-    V c[24], e0, e1;
-    load_cameras<3>(state.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    V c[kCameraRecord], e0, e1;
+    load_cameras<camera_record::kOctets>(state.cameras, &batches.image[8 * b + lane],
+                                         batches.uniform[b], c);
     const Seen seen = see(c, X0, X1, X2);
-    const V fd = hn::Mul(c[12], distortion(c, seen.n));
+    const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
     const V dd = distortion_slope(c, seen.n);
     camera_motion(c, seen, fd, dd, e0, e1);
     add_point_motion(c, seen, fd, dd, step, e0, e1);
@@ -116,8 +118,9 @@ double point_damping(const ProductInput& in, const Chunk& chunk) {
       const V X0 = load(X), X1 = load(X + 8), X2 = load(X + 16);
       V s[3] = {zero(), zero(), zero()}, d[3];
       for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-        V c[24];
-        load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+        V c[kCameraRecord];
+        load_cameras<camera_record::kOctets>(in.cameras, &batches.image[8 * b + lane],
+                                             batches.uniform[b], c);
         add_coupled(c, see(c, X0, X1, X2),
                     in.weights == nullptr ? nullptr : in.weights + 8 * b + lane, s);
       }

@@ -108,10 +108,10 @@ HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w
   for (int i = 0; i < 8; ++i) fields[i] = e.c0(j, i);
   store_records(fields, C, kCRecord);
   for (int i = 0; i < 8; ++i) fields[i] = e.c1(j, i);
-  store_records(fields, C + 8, kCRecord);
+  store_records(fields, C + c_record::row(1), kCRecord);
   for (int q = 0; q < 3; ++q) {
     for (int i = 0; i < 8; ++i) fields[i] = e.t(j, q, i);
-    store_records(fields, T + 8 * q, kTRecord);
+    store_records(fields, T + t_record::column(q), kTRecord);
     last[q] = e.t(j, q, 8);
   }
   last[3] = zero();
@@ -119,7 +119,7 @@ HWY_INLINE void write_records(const LaneJacobian& j, const Factor& f, const V* w
   last[5] = e.c1(j, 8);
   last[6] = e.h0;
   last[7] = e.h1;
-  store_records(last, T + 24, kTRecord);
+  store_records(last, T + t_record::kRow8, kTRecord);
 }
 
 /// As write_records, of blocks that are poses alone: six columns, and h in the seventh of C, so
@@ -134,11 +134,11 @@ HWY_INLINE void write_pose_records(const LaneJacobian& j, const Factor& f, const
   store_records(fields, C, kCRecord);
   for (int i = 0; i < 6; ++i) fields[i] = e.c1(j, i);
   fields[6] = e.h1;
-  store_records(fields, C + 8, kCRecord);
+  store_records(fields, C + c_record::row(1), kCRecord);
   fields[6] = zero();
   for (int q = 0; q < 3; ++q) {
     for (int i = 0; i < 6; ++i) fields[i] = e.t(j, q, i);
-    store_records(fields, T + 8 * q, kTRecord);
+    store_records(fields, T + t_record::column(q), kTRecord);
   }
 }
 
@@ -239,9 +239,9 @@ HWY_INLINE void finish_group(const EliminateInput& in, const PointSums& p,
   Factor x = f;
   V y[3] = {w[0], w[1], w[2]};
   if constexpr (Charted) factor_by_xyz(chart, f, w, x, y);
-  const V all[12] = {x.i00, x.l10, x.l20, x.i11,       x.l21,       x.i22,
-                     y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
-  for (int i = 0; i < 12; ++i) store(all[i], out + 8 * i);
+  const V all[factor_group::kFields] = {x.i00, x.l10, x.l20, x.i11,       x.l21,       x.i22,
+                                        y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
+  for (int i = 0; i < factor_group::kFields; ++i) store(all[i], out + 8 * i);
 
   for (std::uint32_t o = 0; o < of.track; ++o) {
     const std::size_t record = 8 * o + static_cast<std::size_t>(lane);
@@ -286,8 +286,9 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
   V square = sums.square[part], robust = sums.loss[part];
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
-    V c[16];
-    load_cameras<2>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    V c[8 * camera_record::kStateOctets];
+    load_cameras<camera_record::kStateOctets>(in.cameras, &batches.image[8 * b + lane],
+                                              batches.uniform[b], c);
     const double* z = &batches.xy[16 * b + lane];
     LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), scale);
     square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
@@ -299,12 +300,12 @@ HWY_INLINE void eliminate_part(const EliminateInput& in, const Batches::Group& g
     if constexpr (Charted)
       for (V* row : {j.point[0], j.point[1]}) chart.transpose(row);
     p.add(j);
-    save(j, jacobians + kJacobianFields * kLanes * o);
+    save(j, jacobians + row_field::kCount * kLanes * o);
   }
   sums.square[part] = square;
   sums.loss[part] = robust;
 
-  finish_group<Charted>(in, p, chart, {group.track, g, part}, jacobians, kJacobianFields * kLanes,
+  finish_group<Charted>(in, p, chart, {group.track, g, part}, jacobians, row_field::kCount * kLanes,
                         T, C, to, sums);
 }
 

@@ -112,8 +112,8 @@ HWY_INLINE void sum_part(const double* batches, const ImageBatches::Piece& piece
 
 inline void sum(const double* batches, const ImageBatches::Piece& piece, const double* camera,
                 const ScaledLoss& loss, bool lens, double* sums) {
-  V c[16];
-  for (int o = 0; o < 2; ++o) broadcast_record(camera + 8 * o, c + 8 * o);
+  V c[8 * camera_record::kStateOctets];
+  load_cameras<camera_record::kStateOctets>(camera, nullptr, 0, c);
   alignas(64) double lanes[image_sums::kCount * 8];
   std::memset(lanes, 0, sizeof lanes);
   for (int p = 0; p < kParts; ++p) {
@@ -133,13 +133,13 @@ inline void sum(const double* batches, const ImageBatches::Piece& piece, const d
 
 inline void residuals(const double* batches, const ImageBatches::Piece& piece, const double* camera,
                       double* out) {
-  V c[16];
-  for (int o = 0; o < 2; ++o) broadcast_record(camera + 8 * o, c + 8 * o);
+  V c[8 * camera_record::kStateOctets];
+  load_cameras<camera_record::kStateOctets>(camera, nullptr, 0, c);
   for (std::uint32_t b = 0; b < piece.batches; ++b)
     for (int lane = 0; lane < 8; lane += kLanes) {
       const double* z = batches + kBatch * b + lane;
       const Seen seen = see(c, load(z), load(z + 8), load(z + 16));
-      const V fd = hn::Mul(c[12], distortion(c, seen.n));
+      const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
       store(hn::Abs(fms(fd, seen.x, load(z + 24))), out + 16 * b + lane);
       store(hn::Abs(fms(fd, seen.y, load(z + 32))), out + 16 * b + 8 + lane);
     }

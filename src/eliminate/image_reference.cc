@@ -6,23 +6,16 @@
 #include <cmath>
 
 #include "eliminate/image_kernels.h"
-#include "geometry/bal_camera.h"
+#include "eliminate/reference_rows.h"
 
 namespace sheaf {
 namespace {
 
-struct Observed {
-  double r[2];
-  BalJacobian<double> j;
-};
-
-Observed observe(const double* batches, std::uint32_t batch, std::uint32_t lane, const double* c) {
+Row observe(const double* batches, std::uint32_t batch, std::uint32_t lane, const double* c) {
   const double* z = batches + ImageBatches::kBatchDoubles * batch + lane;
-  Matrix3<double> R;
-  std::copy(c, c + 9, R.begin());
-  Observed out;
-  out.j = project_with_jacobian<double>(R, {c[9], c[10], c[11]}, {c[12], c[13], c[14]},
-                                        {z[0], z[8], z[16]});
+  const Observed o = camera_at(c);
+  Row out;
+  out.j = project_with_jacobian<double>(o.R, o.t, o.camera, {z[0], z[8], z[16]});
   for (int d = 0; d < 2; ++d) out.r[d] = out.j.pixel[d] - z[24 + 8 * d];
   return out;
 }
@@ -33,8 +26,8 @@ void sum(const double* batches, const ImageBatches::Piece& piece, const double* 
   for (std::uint32_t b = 0; b < piece.batches; ++b) {
     const std::uint32_t lanes = b + 1 == piece.batches ? piece.last_lanes : 8;
     for (std::uint32_t l = 0; l < lanes; ++l) {
-      const Observed o = observe(batches, b, l, camera);
-      const double square = o.r[0] * o.r[0] + o.r[1] * o.r[1];
+      const Row o = observe(batches, b, l, camera);
+      const double square = o.square();
       const LossValue<double> rho = evaluate_loss(loss, square);
       sums[image_sums::kSquare] += square;
       if (loss.kind != LossKind::none) sums[image_sums::kLoss] += rho.value;
@@ -53,7 +46,7 @@ void residuals(const double* batches, const ImageBatches::Piece& piece, const do
                double* out) {
   for (std::uint32_t b = 0; b < piece.batches; ++b)
     for (std::uint32_t l = 0; l < 8; ++l) {
-      const Observed o = observe(batches, b, l, camera);
+      const Row o = observe(batches, b, l, camera);
       for (int d = 0; d < 2; ++d) out[16 * b + 8 * d + l] = std::fabs(o.r[d]);
     }
 }

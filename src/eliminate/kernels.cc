@@ -109,17 +109,15 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 
 std::size_t scratch_doubles(const Batches& batches, const Chunks& chunks) {
-  return (kTRecord + kCRecord) * 8 * chunks.most_batches +
-         std::size_t(26 * 8) * batches.longest_track;
+  return (kTRecord + kCRecord) * 8 * chunks.most_batches + kRowBatch * batches.longest_track;
 }
 
 std::size_t product_scratch_doubles(const Batches& batches) {
-  // The wider of 16 fields of eight doubles and 31 of sixteen floats.
-  return std::size_t(31 * 8) * batches.longest_track;
+  return kProductScratch * batches.longest_track;
 }
 
 std::size_t coarse_scratch_doubles(const Batches& batches, std::int32_t clusters) {
-  return (24 + 1) * coarse_scratch_clusters(batches, clusters);
+  return kCoarseScratch * coarse_scratch_clusters(batches, clusters);
 }
 
 Records records_in(double* scratch, const Chunks& chunks) {

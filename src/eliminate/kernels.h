@@ -10,24 +10,9 @@
 #include "lists/batches.h"
 #include "lists/block_layout.h"
 #include "lists/chunks.h"
+#include "rows/row_layout.h"
 
 namespace sheaf {
-
-/// The camera side of the state as the kernels read it, 24 doubles per image:
-///   R (9, row-major), t (3), f, k1, k2, then the step to back-substitute:
-///   phi (3), rho (3), df, k1 df + f dk1, k2 df + f dk2.
-constexpr std::size_t kCameraRecord = 24;
-namespace camera_record {
-constexpr int kRotation = 0, kTranslation = 9, kFocal = 12, kStep = 15;
-
-/// The step's nine fields from a camera's columns x; lens: f, k1, k2.
-inline void write_step(const double* lens, const double* x, double* step) {
-  for (int k = 0; k < 3; ++k) step[k] = x[3 + k], step[3 + k] = x[k];
-  step[6] = x[6];
-  step[7] = lens[1] * x[6] + lens[0] * x[7];
-  step[8] = lens[2] * x[6] + lens[0] * x[8];
-}
-}  // namespace camera_record
 
 struct EliminateInput {
   const Batches* batches;
@@ -120,18 +105,6 @@ struct FloatProductInput {
   double origin[3], scale;
   const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
 };
-/// The 24 fields of a camera record, and 8 unused.
-constexpr std::size_t kFloatCameraRecord = 32;
-/// Per image: rho (3), phi (3), then sums of s, s n and s n^2 (s = p . e), 7 unused:
-///   y_f = s0 + k1 s1 + k2 s2, y_k1 = f s1, y_k2 = f s2.
-constexpr std::size_t kProductRecord = 16;
-inline void read_product(const double* lens, const double* sums, double* y) {
-  for (int k = 0; k < 6; ++k) y[k] = sums[k];
-  y[6] = sums[6] + lens[1] * sums[7] + lens[2] * sums[8];
-  y[7] = lens[0] * sums[7];
-  y[8] = lens[0] * sums[8];
-}
-
 struct CoarseInput {
   const double* basis;          ///< kCoarseBasis per image
   const std::int32_t* cluster;  ///< of each image; -1: of none

@@ -18,13 +18,6 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// Numbers of a block, eight lanes each: the lower triangle, row by row; the right-hand side; the
-/// squares that T took from the columns.
-constexpr int kBlockRightSide = 45, kBlockSquares = 54;
-static_assert(kBlockSums == 8 * (kBlockSquares + 9));
-
-HWY_INLINE constexpr int triangle(int row, int column) { return row * (row + 1) / 2 + column; }
-
 /// The sums of the blocks that the lanes of a part look at.
 class LaneBlocks {
  public:
@@ -69,13 +62,14 @@ class BlockSums {
       return j < places.blocks ? number(places.first_block) + static_cast<std::size_t>(j) : none();
     });
     for (int i = 0; i < tracks_.most_width[static_cast<std::size_t>(j)]; ++i) {
-      const V x0 = load(lens + kLanes * lens_field(j, 0, i));
-      const V x1 = load(lens + kLanes * lens_field(j, 1, i));
-      of.put(kBlockRightSide + i, fma(x0, e[0], fma(x1, e[1], of.get(kBlockRightSide + i))));
+      const V x0 = load(lens + kLanes * row_field::lens(j, 0, i));
+      const V x1 = load(lens + kLanes * row_field::lens(j, 1, i));
+      of.put(block_sums::kRightSide + i,
+             fma(x0, e[0], fma(x1, e[1], of.get(block_sums::kRightSide + i))));
       for (int k = 0; k <= i; ++k) {
-        const V y0 = load(lens + kLanes * lens_field(j, 0, k));
-        const V y1 = load(lens + kLanes * lens_field(j, 1, k));
-        of.put(triangle(i, k), fma(x0, y0, fma(x1, y1, of.get(triangle(i, k)))));
+        const V y0 = load(lens + kLanes * row_field::lens(j, 0, k));
+        const V y1 = load(lens + kLanes * row_field::lens(j, 1, k));
+        of.put(block_sums::at(i, k), fma(x0, y0, fma(x1, y1, of.get(block_sums::at(i, k)))));
       }
     }
   }
@@ -93,13 +87,13 @@ class BlockSums {
       row(i, a);
       for (int k = 0; k <= i; ++k) {
         row(k, b);
-        V sum = of.get(triangle(i, k));
+        V sum = of.get(block_sums::at(i, k));
         for (int q = 0; q < 3; ++q) sum = fnma(a[q], b[q], sum);
-        of.put(triangle(i, k), sum);
+        of.put(block_sums::at(i, k), sum);
       }
-      V sum = of.get(kBlockSquares + i);
+      V sum = of.get(block_sums::kSquares + i);
       for (const V& x : a) sum = fma(x, x, sum);
-      of.put(kBlockSquares + i, sum);
+      of.put(block_sums::kSquares + i, sum);
     }
   }
   /// Adds the lanes to the blocks.
@@ -108,19 +102,15 @@ class BlockSums {
       const double* from = sums_ + kBlockSums * block;
       double* to = diagonal + kDiagonalDoubles * (tracks_.image_lens.size() + block);
       const auto of = [&](int number) { return sum8(from + 8 * number); };
-      for (int i = 0; i < 8; ++i) {
-        for (int k = 0; k < i; ++k) {
-          const double x = of(triangle(i, k));
-          to[8 * i + k] += x, to[8 * k + i] += x;
+      for (int i = 0; i < 9; ++i) {
+        for (int k = 0; k <= i; ++k) {
+          const double x = of(block_sums::at(i, k));
+          to[diagonal_layout::at(i, k)] += x;
+          if (k < i && i < 8) to[diagonal_layout::at(k, i)] += x;
         }
-        to[9 * i] += of(triangle(i, i));
-        to[64 + i] += of(triangle(8, i));
-        to[72 + i] += of(kBlockRightSide + i);
-        to[80 + i] += of(kBlockSquares + i);
+        to[diagonal_layout::right_side(i)] += of(block_sums::kRightSide + i);
+        to[diagonal_layout::squares(i)] += of(block_sums::kSquares + i);
       }
-      to[88] += of(triangle(8, 8));
-      to[89] += of(kBlockRightSide + 8);
-      to[90] += of(kBlockSquares + 8);
     }
   }
 

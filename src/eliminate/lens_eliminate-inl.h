@@ -22,7 +22,7 @@ namespace HWY_NAMESPACE {
 
 /// Doubles of one observation's rows, per lane.
 HWY_INLINE std::size_t row_fields(const LensTracks& tracks) {
-  return kJacobianFields + 18 * static_cast<std::size_t>(tracks.most_blocks);
+  return row_field::count(tracks.most_blocks);
 }
 
 /// A part's sums T_l by slot: 9 x 3 vectors per row, columns of the block first.
@@ -30,9 +30,10 @@ class SlotSums {
  public:
   HWY_INLINE SlotSums(double* sums, std::uint32_t rows) : sums_(sums) {
     // One row beyond: where a lens of one block stands last, what would be its second.
-    for (std::size_t i = 0; i < 27 * (std::size_t(rows) + 1); ++i) store(zero(), sums + i * kLanes);
+    for (std::size_t i = 0; i < kSlotSums / 8 * (std::size_t(rows) + 1); ++i)
+      store(zero(), sums + i * kLanes);
   }
-  HWY_INLINE double* row(std::size_t row) { return sums_ + 27 * kLanes * row; }
+  HWY_INLINE double* row(std::size_t row) { return sums_ + kSlotSums / kParts * row; }
 
   HWY_INLINE void add(std::int32_t uniform, const std::uint16_t* rows, int block, int column,
                       const V* t) {
@@ -94,8 +95,8 @@ HWY_INLINE void write_lens_records(const double* lens, const Whitened& m, SlotSu
   V C[2][9], G[2][9];
   for (int i = width; i < 9; ++i) C[0][i] = C[1][i] = G[0][i] = G[1][i] = zero();
   for (int i = 0; i < width; ++i) {
-    const V j0 = load(lens + kLanes * lens_field(block, 0, i));
-    const V j1 = load(lens + kLanes * lens_field(block, 1, i));
+    const V j0 = load(lens + kLanes * row_field::lens(block, 0, i));
+    const V j1 = load(lens + kLanes * row_field::lens(block, 1, i));
     V t[3];
     slots.get(uniform, rows, block, i, t);
     const V g0 = fnma(m.b[0][0], t[0], fnma(m.b[0][1], t[1], fnma(m.b[0][2], t[2], j0)));
@@ -106,12 +107,12 @@ HWY_INLINE void write_lens_records(const double* lens, const Whitened& m, SlotSu
     G[1][i] = hn::Mul(fnma(m.l10, G[0][i], g1), m.i1);
   }
   for (int r = 0; r < 2; ++r) {
-    store_records(C[r], to + 8 * r, stride);
-    store_records(G[r], to + 16 + 8 * r, stride);
+    store_records(C[r], to + lens_pair_record::kC + 8 * r, stride);
+    store_records(G[r], to + lens_pair_record::kG + 8 * r, stride);
   }
   if (width < 9) return;  // not read either
   const V ninths[8] = {C[0][8], C[1][8], G[0][8], G[1][8], zero(), zero(), zero(), zero()};
-  store_records(ninths, to + 32, stride);
+  store_records(ninths, to + lens_pair_record::kC8, stride);
 }
 
 /// The T records of a row of slots.
@@ -119,11 +120,11 @@ HWY_INLINE void write_slot_record(const double* sums, double* to) {
   V fields[8], last[8];
   for (int q = 0; q < 3; ++q) {
     for (int i = 0; i < 8; ++i) fields[i] = load(sums + kLanes * (3 * i + q));
-    store_records(fields, to + 8 * q, kTRecord);
+    store_records(fields, to + t_record::column(q), kTRecord);
     last[q] = load(sums + kLanes * (24 + q));
   }
   for (int i = 3; i < 8; ++i) last[i] = zero();
-  store_records(last, to + 24, kTRecord);
+  store_records(last, to + t_record::kRow8, kTRecord);
 }
 
 /// Where a part of a group's records go.
@@ -143,13 +144,13 @@ HWY_INLINE void sum_slots(const LensEliminateInput& in, const PartOfGroup& to, c
   const std::size_t stride = row_fields(tracks) * kLanes;
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t batch = group.first_batch + o;
-    const double *row = rows + stride * o, *lens = row + kJacobianFields * kLanes;
+    const double *row = rows + stride * o, *lens = row + row_field::kCount * kLanes;
     V b[2][3], e[2];
     for (int r = 0; r < 2; ++r) {
-      const V point[3] = {load(row + kLanes * (20 + 3 * r)), load(row + kLanes * (21 + 3 * r)),
-                          load(row + kLanes * (22 + 3 * r))};
+      V point[3];
+      for (int q = 0; q < 3; ++q) point[q] = load_field(row, row_field::point(r, q));
       forward(f, point, b[r]);
-      e[r] = load(row + kLanes * r);
+      e[r] = load_field(row, row_field::residual(r));
       for (int q = 0; q < 3; ++q) e[r] = fma(b[r][q], w[q], e[r]);
     }
     const std::int32_t uniform = tracks.uniform_slot[batch];
@@ -157,8 +158,8 @@ HWY_INLINE void sum_slots(const LensEliminateInput& in, const PartOfGroup& to, c
     for (int j = 0; j < tracks.most_blocks; ++j) {
       if (sums) sums.add(batch, lane, j, lens, e);
       for (int i = 0; i < tracks.most_width[std::size_t(j)]; ++i) {
-        const V j0 = load(lens + kLanes * lens_field(j, 0, i));
-        const V j1 = load(lens + kLanes * lens_field(j, 1, i));
+        const V j0 = load(lens + kLanes * row_field::lens(j, 0, i));
+        const V j1 = load(lens + kLanes * row_field::lens(j, 1, i));
         V t[3];
         for (int q = 0; q < 3; ++q) t[q] = fma(j0, b[0][q], hn::Mul(j1, b[1][q]));
         slots.add(uniform, at, j, i, t);
@@ -184,11 +185,12 @@ HWY_INLINE void write_group_records(const LensEliminateInput& in, const PartOfGr
     const Whitened m(j, f);
     const std::int32_t uniform = tracks.uniform_slot[group.first_batch + o];
     const std::uint16_t* at = &tracks.slot[8 * (group.first_batch + o) + std::size_t(lane)];
-    const std::size_t each = kLensRecord * static_cast<std::size_t>(blocks);
+    const std::size_t each = kLensPairRecord * static_cast<std::size_t>(blocks);
     for (int b = 0; b < blocks; ++b)
-      write_lens_records(row + kJacobianFields * kLanes, m, slots, uniform, at, b,
+      write_lens_records(row + row_field::kCount * kLanes, m, slots, uniform, at, b,
                          tracks.most_width[std::size_t(b)],
-                         to.lens + each * record + kLensRecord * static_cast<std::size_t>(b), each);
+                         to.lens + each * record + kLensPairRecord * static_cast<std::size_t>(b),
+                         each);
   }
   for (std::uint32_t s = 0; s < tracks.slots_of(to.group); ++s)
     if (sums)
@@ -214,7 +216,7 @@ HWY_INLINE void eliminate_lens_part(const LensEliminateInput& in, const PartOfGr
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     double* row = records.image.jacobians + fields * kLanes * o;
-    double* lens = row + kJacobianFields * kLanes;
+    double* lens = row + row_field::kCount * kLanes;
     LaneJacobian j = lens_rows(in.of, b, lane, X, lens);
     V scale = mask;
     const V square = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
@@ -231,7 +233,7 @@ HWY_INLINE void eliminate_lens_part(const LensEliminateInput& in, const PartOfGr
         for (V& x : j.camera[r]) x = hn::Mul(x, scale);
         for (V& x : j.point[r]) x = hn::Mul(x, scale);
       }
-      for (std::size_t i = 0; i < fields - kJacobianFields; ++i)
+      for (std::size_t i = 0; i < fields - row_field::kCount; ++i)
         store(hn::Mul(load(lens + kLanes * i), scale), lens + kLanes * i);
     }
     p.add(j);
@@ -248,9 +250,10 @@ HWY_INLINE void eliminate_lens_part(const LensEliminateInput& in, const PartOfGr
   sums.decrease[to.part] = hn::Add(sums.decrease[to.part], w2);
   sums.gradient2[to.part] = hn::Max(sums.gradient2[to.part], w2);
   const Factor& f = damped.f;
-  const V all[12] = {f.i00, f.l10, f.l20, f.i11,       f.l21,       f.i22,
-                     w[0],  w[1],  w[2],  damped.D[0], damped.D[1], damped.D[2]};
-  for (int i = 0; i < 12; ++i) store(all[i], out.factors + kFactorGroup * to.group + lane + 8 * i);
+  const V all[factor_group::kFields] = {f.i00, f.l10, f.l20, f.i11,       f.l21,       f.i22,
+                                        w[0],  w[1],  w[2],  damped.D[0], damped.D[1], damped.D[2]};
+  for (int i = 0; i < factor_group::kFields; ++i)
+    store(all[i], out.factors + kFactorGroup * to.group + lane + 8 * i);
   SlotSums slots(records.slots, tracks.slots_of(to.group));
   write_group_records(in, to, f, w, records.image.jacobians, slots,
                       BlockSums(tracks, records.blocks));
@@ -265,7 +268,7 @@ inline void eliminate_lens_chunk(const LensEliminateInput& in, const Chunk& chun
     sums.square[p] = sums.loss[p] = sums.decrease[p] = sums.gradient2[p] = zero();
   if (const BlockSums blocks(tracks, records.blocks); blocks) blocks.clear();
   const std::size_t observations = 8 * (chunk.end_batch - chunk.first_batch);
-  const std::size_t each = kLensRecord * static_cast<std::size_t>(tracks.most_blocks);
+  const std::size_t each = kLensPairRecord * static_cast<std::size_t>(tracks.most_blocks);
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     const std::size_t record = 8 * (in.of.batches->groups[g].first_batch - chunk.first_batch);
     const std::size_t slot = observations + 8 * slots_before(tracks, chunk, g);

@@ -109,14 +109,14 @@ LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const
     rows = std::max<std::size_t>(rows, tracks.slots_of(g));
   C = kTRecord * (observations + (sums ? 0 : 8 * most_slots(tracks, chunks)));
   lens = C + kCRecord * observations;
-  slots = lens + kLensRecord * recorded * observations;
-  blocks = slots + 27 * 8 * (rows + 1);
+  slots = lens + kLensPairRecord * recorded * observations;
+  blocks = slots + kSlotSums * (rows + 1);
   jacobians = blocks + (sums ? kBlockSums * (all_blocks + 1) : 0);
-  doubles = jacobians + 8 * (26 + 18 * row_blocks) * batches.longest_track;
+  doubles = jacobians + product_scratch_doubles(batches, tracks);
 }
 
 std::size_t product_scratch_doubles(const Batches& batches, const LensTracks& tracks) {
-  return 8 * (26 + 18 * static_cast<std::size_t>(tracks.most_blocks)) * batches.longest_track;
+  return 8 * row_field::count(tracks.most_blocks) * batches.longest_track;
 }
 
 const LensKernels& lens_kernels(const char* simd_name) {

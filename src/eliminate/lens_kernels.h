@@ -10,14 +10,7 @@
 
 namespace sheaf {
 
-/// Records of 24 doubles. Of an image: R (9, row-major), t (3), the step to back-substitute: rho
-/// (3), phi (3). Of a lens: parameters (12), their step (12).
-constexpr std::size_t kLensStateRecord = 24;
-namespace lens_record {
-constexpr int kPoseStep = 12, kParameterStep = 12;
-}
-
-/// A state of images, lenses and points (kPointGroup per group).
+/// A state: kImageRecord per image, kLensRecord per lens, kPointGroup per group.
 struct LensState {
   const double *images, *lenses, *points;
 };
@@ -40,10 +33,9 @@ struct LensEliminateInput {
 /// in T. `lens` has, for each observation and block of its lens, what the products between the
 /// lens and itself or the image need: with J the lens's columns,
 ///   C = Lm^T J,   G = Lm^-1 (J - B T_l^T),   so that a^T G = J_a^T J - T_a T_l^T for C_a = Lm^T
-///   J_a:
-/// C's two rows (8 each), G's two rows, then, where a lens has nine columns in the block, their
-/// ninths: C (2), G (2), 4 unused. Where only diagonal blocks of a few lenses are wanted, `blocks`
-/// holds these as they are summed, and there are no records of lenses and slots.
+///   J_a;
+/// kLensPairRecord doubles. Where only diagonal blocks of a few lenses are wanted, `blocks` holds
+/// these as they are summed, and there are no records of lenses and slots.
 struct LensRecords {
   Records image;
   double* lens;

@@ -73,7 +73,7 @@ HWY_INLINE V row_scale(const LensProductInput& in, std::uint64_t batch, int lane
 HWY_INLINE void first_lens_sweep(const LensProductInput& in, std::uint64_t batch, int lane,
                                  const V* X, V scale, double* row, V* s) {
   const LensTracks& tracks = *in.of.tracks;
-  double* lens = row + kJacobianFields * kLanes;
+  double* lens = row + row_field::kCount * kLanes;
   LaneJacobian j = lens_rows(in.of, batch, lane, X, lens);
   V x[9], e[2];
   load_image(in.x, &in.of.batches->image[8 * batch + lane], in.of.batches->uniform[batch], x);
@@ -84,7 +84,8 @@ HWY_INLINE void first_lens_sweep(const LensProductInput& in, std::uint64_t batch
   for (int b = 0; b < tracks.most_blocks; ++b) {
     load_block(in.x, LensBlocks(tracks, batch, b), lane, x);
     for (int r = 0; r < 2; ++r)
-      for (int i = 0; i < 9; ++i) e[r] = fma(load(lens + kLanes * lens_field(b, r, i)), x[i], e[r]);
+      for (int i = 0; i < 9; ++i)
+        e[r] = fma(load(lens + kLanes * row_field::lens(b, r, i)), x[i], e[r]);
   }
   // Of the two factors of each product of rows, one takes the whole weight.
   scale = hn::Mul(scale, scale);
@@ -99,16 +100,17 @@ HWY_INLINE void second_lens_sweep(const double* row, int blocks, V scale, const 
   scale = hn::Mul(scale, scale);
   for (int r = 0; r < 2; ++r) {
     V along = zero();
-    for (int i = 0; i < 3; ++i) along = fma(load(row + (20 + 3 * r + i) * kLanes), u[i], along);
-    e[r] = fnma(scale, along, load(row + r * kLanes));
+    for (int i = 0; i < 3; ++i) along = fma(load_field(row, row_field::point(r, i)), u[i], along);
+    e[r] = fnma(scale, along, load_field(row, row_field::residual(r)));
   }
   for (int i = 0; i < 9; ++i)
-    v[i] = fma(load(row + (2 + i) * kLanes), e[0], hn::Mul(load(row + (11 + i) * kLanes), e[1]));
-  const double* lens = row + kJacobianFields * kLanes;
+    v[i] = fma(load_field(row, row_field::camera(0, i)), e[0],
+               hn::Mul(load_field(row, row_field::camera(1, i)), e[1]));
+  const double* lens = row + row_field::kCount * kLanes;
   for (int b = 0; b < blocks; ++b)
     for (int i = 0; i < 9; ++i)
-      v[9 + 9 * b + i] = fma(load(lens + kLanes * lens_field(b, 0, i)), e[0],
-                             hn::Mul(load(lens + kLanes * lens_field(b, 1, i)), e[1]));
+      v[9 + 9 * b + i] = fma(load(lens + kLanes * row_field::lens(b, 0, i)), e[0],
+                             hn::Mul(load(lens + kLanes * row_field::lens(b, 1, i)), e[1]));
 }
 
 HWY_INLINE void scatter_to_lenses(const double* rows, const double* ninth, const LensBlocks& blocks,
@@ -204,7 +206,7 @@ HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batc
 /// free parameter in turn.
 HWY_INLINE void second_plain_sweep(const double* saved, const LensPlaces& lens, int lane, V scale,
                                    const V* u, V* v, double* sums) {
-  const auto field = [&](int i) { return load(saved + i * kLanes); };
+  const auto field = [&](int i) { return load_field(saved, i); };
   scale = hn::Mul(scale, scale);
   V m[3], e[2];
   for (int i = 0; i < 3; ++i)

@@ -26,7 +26,7 @@ struct TwoRows {
 struct ImageRows {
   const Records& from;
   HWY_INLINE TwoRows at(std::uint16_t record) const {
-    return {from.C + kCRecord * record, from.T + kTRecord * record + 28};
+    return {from.C + kCRecord * record, from.T + kTRecord * record + t_record::kC8};
   }
 };
 constexpr double kNoNinths[2] = {0, 0};
@@ -38,7 +38,8 @@ struct LensRows {
   bool nine_wide;
   HWY_INLINE TwoRows at(std::uint16_t record) const {
     const double* of = lens + stride * record;
-    return {of + (kG ? 16 : 0), nine_wide ? of + (kG ? 34 : 32) : kNoNinths};
+    namespace at = lens_pair_record;
+    return {of + (kG ? at::kG : at::kC), nine_wide ? of + (kG ? at::kG8 : at::kC8) : kNoNinths};
   }
 };
 
@@ -74,8 +75,11 @@ HWY_INLINE void multiply_run(const std::uint16_t* records, std::uint32_t count, 
 
 HWY_INLINE void take_from_tile(const RunSums& sums, double* tile) {
   for (int i = 0; i < 64; ++i) tile[i] -= sums.square[i];
-  for (int i = 0; i < 8; ++i) tile[64 + i] -= sums.row[i], tile[72 + i] -= sums.column[i];
-  tile[80] -= sums.corner;
+  for (int i = 0; i < 8; ++i) {
+    tile[tile_layout::kRow8 + i] -= sums.row[i];
+    tile[tile_layout::kColumn8 + i] -= sums.column[i];
+  }
+  tile[tile_layout::kCorner] -= sums.corner;
 }
 
 /// The lens's right-hand side, sum C^T h; h stands in the images' records.
@@ -85,24 +89,25 @@ HWY_INLINE void add_right_side(const std::uint16_t* records, std::uint32_t count
     const int column = part * kLanes;
     V sum = zero();
     for (std::uint32_t i = 0; i < count; ++i) {
-      const double *c = C.at(records[i]).eight + column, *h = from.T + kTRecord * records[i] + 30;
+      const double *c = C.at(records[i]).eight + column,
+                   *h = from.T + kTRecord * records[i] + t_record::kH;
       sum = fma(set(h[0]), load(c), fma(set(h[1]), load(c + 8), sum));
     }
-    add_to(sum, block + 72 + column);
+    add_to(sum, block + diagonal_layout::kRightSide + column);
   }
   double ninth = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double *c = C.at(records[i]).ninth, *h = from.T + kTRecord * records[i] + 30;
+    const double *c = C.at(records[i]).ninth, *h = from.T + kTRecord * records[i] + t_record::kH;
     ninth += c[0] * h[0] + c[1] * h[1];
   }
-  block[89] += ninth;
+  block[diagonal_layout::kRightSide8] += ninth;
 }
 
 /// S_ll = sum C^T G: added to the lens's diagonal block.
 HWY_INLINE void add_to_block(const RunSums& sums, double* block) {
   for (int i = 0; i < 64; ++i) block[i] += sums.square[i];
-  for (int i = 0; i < 8; ++i) block[64 + i] += sums.row[i];
-  block[88] += sums.corner;
+  for (int i = 0; i < 8; ++i) block[diagonal_layout::kRow8 + i] += sums.row[i];
+  block[diagonal_layout::kCorner] += sums.corner;
 }
 
 /// What T_l took from the squares of the lens's columns, as diagonal blocks say it.
@@ -114,9 +119,12 @@ inline void add_slot_squares(const LensTracks& tracks, const Chunk& chunk, const
        ++at, t += kTRecord) {
     if (tracks.slot_block[at] < 0) continue;
     double* block = diagonal + kDiagonalDoubles * static_cast<std::size_t>(tracks.slot_block[at]);
+    const auto square3 = [](double x, double y, double z) { return x * x + y * y + z * z; };
     for (int i = 0; i < 8; ++i)
-      block[80 + i] += t[i] * t[i] + t[8 + i] * t[8 + i] + t[16 + i] * t[16 + i];
-    block[90] += t[24] * t[24] + t[25] * t[25] + t[26] * t[26];
+      block[diagonal_layout::kSquares + i] += square3(
+          t[t_record::column(0) + i], t[t_record::column(1) + i], t[t_record::column(2) + i]);
+    const double* last = t + t_record::kRow8;
+    block[diagonal_layout::kSquares8] += square3(last[0], last[1], last[2]);
   }
 }
 
@@ -136,13 +144,14 @@ inline void pose_pair_products(const Chunks& chunks, const Chunk& chunk, const R
         const double* b = from.T + kTRecord * pairs[i].b;
         for (int q = 0; q < 3; ++q) {
           V* to = q == 1 ? odd : even;
-          const V v = load(b + 8 * q + column), loaded = load(a + 8 * q + column);
-          to[0] = fma(broadcast<0>(a + 8 * q, loaded), v, to[0]);
-          to[1] = fma(broadcast<1>(a + 8 * q, loaded), v, to[1]);
-          to[2] = fma(broadcast<2>(a + 8 * q, loaded), v, to[2]);
-          to[3] = fma(broadcast<3>(a + 8 * q, loaded), v, to[3]);
-          to[4] = fma(broadcast<4>(a + 8 * q, loaded), v, to[4]);
-          to[5] = fma(broadcast<5>(a + 8 * q, loaded), v, to[5]);
+          const V v = load(b + t_record::column(q) + column),
+                  loaded = load(a + t_record::column(q) + column);
+          to[0] = fma(broadcast<0>(a + t_record::column(q), loaded), v, to[0]);
+          to[1] = fma(broadcast<1>(a + t_record::column(q), loaded), v, to[1]);
+          to[2] = fma(broadcast<2>(a + t_record::column(q), loaded), v, to[2]);
+          to[3] = fma(broadcast<3>(a + t_record::column(q), loaded), v, to[3]);
+          to[4] = fma(broadcast<4>(a + t_record::column(q), loaded), v, to[4]);
+          to[5] = fma(broadcast<5>(a + t_record::column(q), loaded), v, to[5]);
         }
       }
       for (int k = 0; k < 6; ++k) add_to(hn::Add(even[k], odd[k]), tile + 8 * k + column);
@@ -154,7 +163,7 @@ inline void lens_products(const LensTracks& tracks, const LensTiles& tiles_of, c
                           const Chunk& chunk, const LensRecords& from, double* diagonal,
                           double* tiles) {
   if (const BlockSums blocks(tracks, from.blocks); blocks) return blocks.flush(diagonal);
-  const std::size_t stride = kLensRecord * static_cast<std::size_t>(tracks.most_blocks);
+  const std::size_t stride = kLensPairRecord * static_cast<std::size_t>(tracks.most_blocks);
   const ImageRows image_rows{from.image};
   RunSums sums;
   for (std::uint64_t i = chunk.first_diagonal_run; i < chunk.end_diagonal_run; ++i) {
@@ -164,8 +173,8 @@ inline void lens_products(const LensTracks& tracks, const LensTiles& tiles_of, c
     const LensPlaces& places = tracks.lenses[lens];
     for (std::uint32_t j = 0; j < places.blocks; ++j) {
       const bool nine_wide = tracks.most_width[j] == 9;
-      const LensRows<false> C{from.lens + kLensRecord * j, stride, nine_wide};
-      const LensRows<true> G{from.lens + kLensRecord * j, stride, nine_wide};
+      const LensRows<false> C{from.lens + kLensPairRecord * j, stride, nine_wide};
+      const LensRows<true> G{from.lens + kLensPairRecord * j, stride, nine_wide};
       if (!tiles_of.of_image.empty()) {
         multiply_run(records, run.count, G, image_rows, sums);
         take_from_tile(sums, tiles + kTileDoubles * tiles_of.of_image[2 * run.image + j]);

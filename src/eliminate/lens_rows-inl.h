@@ -18,8 +18,6 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-static_assert(kLensStateRecord == 24, "as load_cameras reads them");
-
 /// Which kinds of lenses the lanes of a part look through: of_part() and mask() of each in turn.
 class LaneKinds {
  public:
@@ -58,8 +56,8 @@ class LaneKinds {
 
 /// One observation per lane as it is seen.
 struct LensView {
-  V c[24];     ///< the image's record, as far as it was asked for
-  Lane k[24];  ///< the lens's
+  V c[kImageRecord];    ///< the image's record, as far as it was asked for
+  Lane k[kLensRecord];  ///< the lens's
   Lane P[3];
   LensJacobian<Lane> J;  ///< parameters: in the order of each lane's own model; 0 beyond
 };
@@ -93,15 +91,22 @@ HWY_INLINE void project_kinds(LaneKinds kinds, LensView& out) {
 template <Wanted kWanted, bool kSteps>
 HWY_INLINE void look(const Batches& batches, const LensTracks& tracks, const LensState& at,
                      std::uint64_t batch, int lane, const V* X, LensView& out) {
-  load_cameras<kSteps ? 3 : 2>(at.images, &batches.image[8 * batch + lane], batches.uniform[batch],
-                               out.c);
-  V k[24];
-  load_cameras<kSteps ? 3 : 2>(at.lenses, &tracks.lens[8 * batch + lane],
+  load_state<kSteps ? 3 : 2, kImageRecord>(at.images, &batches.image[8 * batch + lane],
+                                           batches.uniform[batch], out.c);
+  const auto load_eight = [&](int first) {
+    V k[8];
+    load_state<1, kLensRecord>(at.lenses + first, &tracks.lens[8 * batch + lane],
                                tracks.uniform_lens[batch], k);
-  for (int i = 0; i < (kSteps ? 24 : 12); ++i) out.k[i].v = k[i];
+    for (int i = 0; i < 8; ++i) out.k[first + i].v = k[i];
+  };
+  for (int first = 0; first < tracks.most_parameters; first += 8) {
+    load_eight(first);
+    if (kSteps) load_eight(lens_record::kStep + first);
+  }
   for (int i = 0; i < 3; ++i)
     out.P[i].v = fma(out.c[3 * i], X[0],
-                     fma(out.c[3 * i + 1], X[1], fma(out.c[3 * i + 2], X[2], out.c[9 + i])));
+                     fma(out.c[3 * i + 1], X[1],
+                         fma(out.c[3 * i + 2], X[2], out.c[pose_record::kTranslation + i])));
   project_kinds<kWanted>(LaneKinds(tracks, batch, lane), out);
 }
 
@@ -113,11 +118,8 @@ HWY_INLINE void point_rows(const LensView& s, V out[2][3]) {
                       fma(s.J.point[r][1].v, s.c[3 + i], hn::Mul(s.J.point[r][2].v, s.c[6 + i])));
 }
 
-/// The lens's own columns of a row pair: kLanes each at
-/// [18 j + 9 r + i] for column i of block j in row r.
-HWY_INLINE constexpr int lens_field(int j, int r, int i) { return 18 * j + 9 * r + i; }
-
-/// Puts the parameters' derivatives where their columns are; the rest is 0.
+/// Puts the parameters' derivatives where their columns are, those of the lens's own blocks at
+/// row_field::lens of `lens`; the rest is 0.
 HWY_INLINE void place_parameters(LaneKinds kinds, const LensView& s, int blocks, LaneJacobian& j,
                                  double* lens) {
   const bool uniform = kinds.uniform();
@@ -138,7 +140,7 @@ HWY_INLINE void place_parameters(LaneKinds kinds, const LensView& s, int blocks,
           continue;
         }
         const int block = (place - LensPlaces::kRiders) / 9, i = (place - LensPlaces::kRiders) % 9;
-        double* to = lens + kLanes * lens_field(block, r, i);
+        double* to = lens + kLanes * row_field::lens(block, r, i);
         store(uniform ? x : hn::IfThenElse(mask, x, load(to)), to);
       }
     }

@@ -20,12 +20,12 @@ namespace HWY_NAMESPACE {
 
 /// e = A (rho + phi x P) + (du / dk) dk of one observation per lane.
 HWY_INLINE void lens_motion(const LensView& s, int parameters, V* e) {
-  const V *rho = s.c + lens_record::kPoseStep, *phi = rho + 3;
+  const V *rho = s.c + image_record::kStep, *phi = rho + 3;
   const V P0 = s.P[0].v, P1 = s.P[1].v, P2 = s.P[2].v;
   const V d[3] = {hn::Add(rho[0], fms(phi[1], P2, hn::Mul(phi[2], P1))),
                   hn::Add(rho[1], fms(phi[2], P0, hn::Mul(phi[0], P2))),
                   hn::Add(rho[2], fms(phi[0], P1, hn::Mul(phi[1], P0)))};
-  const Lane* dk = s.k + lens_record::kParameterStep;
+  const Lane* dk = s.k + lens_record::kStep;
   for (int r = 0; r < 2; ++r) {
     e[r] = fma(s.J.point[r][0].v, d[0],
                fma(s.J.point[r][1].v, d[1], hn::Mul(s.J.point[r][2].v, d[2])));
@@ -42,7 +42,7 @@ HWY_INLINE void add_lens_coupling(const LensTrialInput& in, std::uint64_t batch,
   look<Wanted::parameters, true>(*in.batches, tracks, in.held, batch, lane, X, view);
   const std::int32_t kind = tracks.uniform_kind[batch];
   const int count = kind < 0
-                        ? static_cast<int>(kMaxCameraParameters)
+                        ? tracks.most_parameters
                         : static_cast<int>(parameter_count(tracks.kinds[std::size_t(kind)].model));
   V e[2], point[2][3];
   lens_motion(view, count, e);
@@ -104,9 +104,9 @@ HWY_INLINE void refine_lens_points(const LensTrialInput& in, const Batches::Grou
   const V worth_more = set(inner_iterations::kWorthMore * mean);
   const V weak = set(inner_iterations::kDamping);
   for (int steps_left = in.inner_iterations; steps_left > 0;) {
-    const Factor f =
-        factor3(fma(weak, load(pd + 72), p.v00), p.v01, p.v02, fma(weak, load(pd + 80), p.v11),
-                p.v12, fma(weak, load(pd + 88), p.v22));
+    const Factor f = factor3(fma(weak, load(pd + factor_group::damping(0)), p.v00), p.v01, p.v02,
+                             fma(weak, load(pd + factor_group::damping(1)), p.v11), p.v12,
+                             fma(weak, load(pd + factor_group::damping(2)), p.v22));
     V w[3], d[3], Y[3];
     forward(f, p.g, w);
     backward(f, w, d);

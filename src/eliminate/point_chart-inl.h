@@ -28,10 +28,12 @@ HWY_INLINE void load_base(const ChartRules& rules, const Batches& batches, std::
     for (int k = 0; k < 3; ++k) base[k] = set(rules.origin[k]);
     return;
   }
-  V c[16];
-  load_cameras<2>(cameras, &batches.image[8 * batch + lane], batches.uniform[batch], c);
+  V c[8 * camera_record::kStateOctets];
+  load_cameras<camera_record::kStateOctets>(cameras, &batches.image[8 * batch + lane],
+                                            batches.uniform[batch], c);
+  const V* t = c + camera_record::kTranslation;
   for (int k = 0; k < 3; ++k)
-    base[k] = hn::Neg(fma(c[k], c[9], fma(c[3 + k], c[10], hn::Mul(c[6 + k], c[11]))));
+    base[k] = hn::Neg(fma(c[k], t[0], fma(c[3 + k], t[1], hn::Mul(c[6 + k], t[2]))));
 }
 
 /// PointChart of a point in each lane.

@@ -40,20 +40,23 @@ HWY_INLINE void diagonal_part(const std::uint16_t* records, std::uint32_t count,
   for (std::uint32_t i = 0; i < count; ++i) {
     const double* c = from.C + kCRecord * records[i];
     const double* t = from.T + kTRecord * records[i];
-    const V c0 = load(c + column), c1 = load(c + 8 + column);
+    const V c0 = load(c + column), c1 = load(c + c_record::row(1) + column);
     outer8(c, c0, c0, a);
-    outer8(c + 8, c1, c1, a);
-    a8 = fma(set(t[28]), c0, fma(set(t[29]), c1, a8));
-    rhs = fma(set(t[30]), c0, fma(set(t[31]), c1, rhs));
-    const V t0 = load(t + column), t1 = load(t + 8 + column), t2 = load(t + 16 + column);
+    outer8(c + c_record::row(1), c1, c1, a);
+    const double *c8 = t + t_record::kC8, *h = t + t_record::kH;
+    a8 = fma(set(c8[0]), c0, fma(set(c8[1]), c1, a8));
+    rhs = fma(set(h[0]), c0, fma(set(h[1]), c1, rhs));
+    const V t0 = load(t + t_record::column(0) + column),
+            t1 = load(t + t_record::column(1) + column),
+            t2 = load(t + t_record::column(2) + column);
     squares = fma(t0, t0, fma(t1, t1, fma(t2, t2, squares)));
-    const V last = load(t + 24 + column);
+    const V last = load(t + t_record::kRow8 + column);
     ninth = fma(last, last, ninth);
   }
   for (int k = 0; k < 8; ++k) add_to(a[k], sums + 8 * k + column);
-  add_to(a8, sums + 64 + column);
-  add_to(rhs, sums + 72 + column);
-  add_to(squares, sums + 80 + column);
+  add_to(a8, sums + diagonal_layout::kRow8 + column);
+  add_to(rhs, sums + diagonal_layout::kRightSide + column);
+  add_to(squares, sums + diagonal_layout::kSquares + column);
   store(ninth, ninths + column);
 }
 
@@ -63,12 +66,14 @@ HWY_INLINE void diagonal_run(const std::uint16_t* records, std::uint32_t count, 
   for (int p = 0; p < kParts; ++p) diagonal_part(records, count, p, from, sums, ninths);
   double rhs = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double* last = from.T + kTRecord * records[i] + 24;
-    rhs += last[4] * last[6] + last[5] * last[7];
+    const double* t = from.T + kTRecord * records[i];
+    const double *c8 = t + t_record::kC8, *h = t + t_record::kH;
+    rhs += c8[0] * h[0] + c8[1] * h[1];
   }
-  sums[88] += ninths[4] + ninths[5];
-  sums[89] += rhs;
-  sums[90] += ninths[0] + ninths[1] + ninths[2];
+  constexpr int kC8 = t_record::kC8 - t_record::kRow8;
+  sums[diagonal_layout::kCorner] += ninths[kC8] + ninths[kC8 + 1];
+  sums[diagonal_layout::kRightSide8] += rhs;
+  sums[diagonal_layout::kSquares8] += ninths[0] + ninths[1] + ninths[2];
 }
 
 /// Without lists: the records in their own order, eight at a time where one image has all lanes.
@@ -111,16 +116,17 @@ HWY_INLINE void pair_part(const RecordPair* pairs, std::uint32_t count, int part
     const double* ti = T + kTRecord * pairs[i].a;
     const double* tj = T + kTRecord * pairs[i].b;
     for (int q = 0; q < 3; ++q) {
-      const V vi = load(ti + 8 * q + column), vj = load(tj + 8 * q + column);
-      outer8(ti + 8 * q, vi, vj, a);
-      a8 = fma(set(ti[24 + q]), vj, a8);
-      a9 = fma(set(tj[24 + q]), vi, a9);
+      const int of = t_record::column(q);
+      const V vi = load(ti + of + column), vj = load(tj + of + column);
+      outer8(ti + of, vi, vj, a);
+      a8 = fma(set(ti[t_record::kRow8 + q]), vj, a8);
+      a9 = fma(set(tj[t_record::kRow8 + q]), vi, a9);
     }
-    ninths = fma(load(ti + 24 + column), load(tj + 24 + column), ninths);
+    ninths = fma(load(ti + t_record::kRow8 + column), load(tj + t_record::kRow8 + column), ninths);
   }
   for (int k = 0; k < 8; ++k) add_to(a[k], tile + 8 * k + column);
-  add_to(a8, tile + 64 + column);
-  add_to(a9, tile + 72 + column);
+  add_to(a8, tile + tile_layout::kRow8 + column);
+  add_to(a9, tile + tile_layout::kColumn8 + column);
   store(ninths, corner + column);
 }
 
@@ -132,7 +138,7 @@ inline void pair_products(const Chunks& chunks, const Chunk& chunk, const Record
     double* tile = tiles + kTileDoubles * run.tile;
     alignas(64) double corner[8];
     for (int p = 0; p < kParts; ++p) pair_part(pairs, run.count, p, from.T, tile, corner);
-    tile[80] += corner[0] + corner[1] + corner[2];
+    tile[tile_layout::kCorner] += corner[0] + corner[1] + corner[2];
   }
 }
 

@@ -16,10 +16,10 @@ namespace {
 
 void store_factor(const Factor3& f, const Vector3<double>& w, const Vector3<double>& D,
                   double* out) {
-  std::array<double, 12> all{1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22,
-                             w[0],      w[1],  w[2],  D[0],      D[1],  D[2]};
+  std::array<double, factor_group::kFields> all{
+      1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22, w[0], w[1], w[2], D[0], D[1], D[2]};
   if (f.held) all.fill(0);
-  for (int i = 0; i < 12; ++i) out[8 * i] = all[i];
+  for (int i = 0; i < factor_group::kFields; ++i) out[8 * i] = all[i];
 }
 
 void write_record(const Row& row, const Factor3& f, const Vector3<double>& w, double* T,
@@ -35,14 +35,14 @@ void write_record(const Row& row, const Factor3& f, const Vector3<double>& w, do
   const double l11 = std::sqrt(std::max(m11 - l10 * l10, 1e-20));
   for (int k = 0; k < 9; ++k) {
     const double c0 = l00 * Jc[k] + l10 * Jc[9 + k], c1 = l11 * Jc[9 + k];
-    (k < 8 ? C[k] : T[28]) = c0;
-    (k < 8 ? C[8 + k] : T[29]) = c1;
-    for (int i = 0; i < 3; ++i)
-      (k < 8 ? T[8 * i + k] : T[24 + i]) = Jc[k] * B0[i] + Jc[9 + k] * B1[i];
+    c_entry(T, C, 0, k) = c0;
+    c_entry(T, C, 1, k) = c1;
+    for (int i = 0; i < 3; ++i) T[t_record::at(i, k)] = Jc[k] * B0[i] + Jc[9 + k] * B1[i];
   }
-  T[27] = 0;
-  T[30] = q[0] / l00;
-  T[31] = (q[1] - l10 * T[30]) / l11;
+  double* h = T + t_record::kH;
+  T[t_record::kRow8 + 3] = 0;
+  h[0] = q[0] / l00;
+  h[1] = (q[1] - l10 * h[0]) / l11;
 }
 
 void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g,
@@ -95,27 +95,19 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   }
 }
 
-/// Entry k of the three columns of T, and of the two rows of C: 8 + 1 storage undone.
-double t_entry(const double* T, int column, int k) {
-  return k < 8 ? T[8 * column + k] : T[24 + column];
-}
-double c_entry(const double* T, const double* C, int row, int k) {
-  return k < 8 ? C[8 * row + k] : T[28 + row];
-}
-
 void add_diagonal(const double* T, const double* C, double* to) {
   for (int i = 0; i < 9; ++i) {
     for (int k = 0; k < 9; ++k) {
       const double s =
           c_entry(T, C, 0, i) * c_entry(T, C, 0, k) + c_entry(T, C, 1, i) * c_entry(T, C, 1, k);
-      if (k < 8) to[8 * i + k] += s;
-      if (k == 8 && i == 8) to[88] += s;
+      if (k < 8 || i == 8) to[diagonal_layout::at(i, k)] += s;
     }
     double squares = 0;
-    for (int c = 0; c < 3; ++c) squares += t_entry(T, c, i) * t_entry(T, c, i);
-    const double rhs = c_entry(T, C, 0, i) * T[30] + c_entry(T, C, 1, i) * T[31];
-    to[i < 8 ? 72 + i : 89] += rhs;
-    to[i < 8 ? 80 + i : 90] += squares;
+    for (int c = 0; c < 3; ++c) squares += T[t_record::at(c, i)] * T[t_record::at(c, i)];
+    const double* h = T + t_record::kH;
+    const double rhs = c_entry(T, C, 0, i) * h[0] + c_entry(T, C, 1, i) * h[1];
+    to[diagonal_layout::right_side(i)] += rhs;
+    to[diagonal_layout::squares(i)] += squares;
   }
 }
 
@@ -123,8 +115,8 @@ void add_pair(const double* Ta, const double* Tb, double* tile) {
   for (int i = 0; i < 9; ++i)
     for (int k = 0; k < 9; ++k) {
       double s = 0;
-      for (int c = 0; c < 3; ++c) s += t_entry(Ta, c, i) * t_entry(Tb, c, k);
-      tile[k < 8 ? 8 * i + k : (i < 8 ? 72 + i : 80)] += s;
+      for (int c = 0; c < 3; ++c) s += Ta[t_record::at(c, i)] * Tb[t_record::at(c, k)];
+      tile[tile_layout::at(i, k)] += s;
     }
 }
 
@@ -175,7 +167,8 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
   const auto projected = [&](std::size_t record, std::uint32_t image, int q, int m) {
     double sum = 0;
     for (int r = 0; r < 7; ++r)
-      sum += records.T[kTRecord * record + 8 * q + r] * in.basis[kCoarseBasis * image + 8 * r + m];
+      sum += records.T[kTRecord * record + t_record::at(q, r)] *
+             in.basis[kCoarseBasis * image + 8 * r + m];
     return sum;
   };
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
@@ -224,8 +217,9 @@ void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, do
     std::array<double, 9> v{};
     for (int r = 0; r < 2; ++r)
       for (int k = 0; k < 9; ++k) v[k] += w * row.j.camera[9 * r + k] * e[r];
-    v[7] /= record[12], v[8] /= record[12];  // to the sums s n, s n^2, and s from y_f
-    v[6] -= record[13] * v[7] + record[14] * v[8];
+    const double* lens = record + camera_record::kFocal;
+    v[7] /= lens[0], v[8] /= lens[0];  // to the sums s n, s n^2, and s from y_f
+    v[6] -= lens[1] * v[7] + lens[2] * v[8];
     for (int k = 0; k < 9; ++k) y[kProductRecord * image + k] += v[k];
   }
 }

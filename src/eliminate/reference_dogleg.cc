@@ -6,40 +6,21 @@
 #include <array>
 
 #include "eliminate/dogleg_kernels.h"
-#include "geometry/bal_camera.h"
+#include "eliminate/reference_rows.h"
 
 namespace sheaf {
 namespace {
 
-/// Jacobians and residual of one observation, and the weight of its loss.
+/// One observation, and the weight of its loss.
 struct WeightedRow {
-  BalJacobian<double> j;
-  std::array<double, 2> r;
+  Row row;
   double weight;
   const double* record;
 
-  WeightedRow(const ProductInput& in, std::size_t g, std::uint64_t b, std::uint32_t lane) {
-    const Batches& batches = *in.batches;
-    record = in.cameras + kCameraRecord * batches.image[8 * b + lane];
-    Matrix3<double> R;
-    std::copy(record, record + 9, R.begin());
-    const double* X = in.points + kPointGroup * g + lane;
-    j = project_with_jacobian<double>(R, {record[9], record[10], record[11]},
-                                      {record[12], record[13], record[14]}, {X[0], X[8], X[16]});
-    for (int i = 0; i < 2; ++i) r[i] = j.pixel[i] - batches.xy[16 * b + 8 * i + lane];
-    weight = in.weights == nullptr ? 1 : in.weights[8 * b + lane];
-  }
-
-  /// Row r of Jc dc, from the step in the camera record.
-  double camera_motion(int r) const {
-    const double* s = record + camera_record::kStep;
-    const double f = record[12];
-    const double dk1 = (s[7] - record[13] * s[6]) / f, dk2 = (s[8] - record[14] * s[6]) / f;
-    const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6], dk1, dk2};
-    double e = 0;
-    for (int k = 0; k < 9; ++k) e += j.camera[9 * r + k] * dc[k];
-    return e;
-  }
+  WeightedRow(const ProductInput& in, std::size_t g, std::uint64_t b, std::uint32_t lane)
+      : row(row_of(*in.batches, in.cameras, point_of(in.points, g, lane), b, lane)),
+        weight(weight_of(in.weights, b, lane)),
+        record(in.cameras + kCameraRecord * in.batches->image[8 * b + lane]) {}
 };
 
 template <class Visit>
@@ -55,7 +36,7 @@ void gradient(const ProductInput& in, const Chunk& chunk, double* sums) {
     const WeightedRow row(in, g, b, l);
     double* to = sums + kProductRecord * in.batches->image[8 * b + l];
     for (int i = 0; i < 2; ++i)
-      for (int k = 0; k < 9; ++k) to[k] -= row.weight * row.j.camera[9 * i + k] * row.r[i];
+      for (int k = 0; k < 9; ++k) to[k] -= row.weight * row.row.j.camera[9 * i + k] * row.row.r[i];
   });
 }
 
@@ -83,22 +64,12 @@ void curvature(const CurvatureInput& in, const Chunk& chunk, CurvatureOutput& ou
   for_each_observation(batches, chunk, [&](std::size_t g, std::uint64_t b, std::uint32_t l) {
     const WeightedRow row(in.state, g, b, l);
     const PointDescent point(in, g, l);
+    auto e = camera_motion(row.row, row.record);
     for (int r = 0; r < 2; ++r) {
-      double e = row.camera_motion(r);
-      for (int k = 0; k < 3; ++k) e += row.j.point[3 * r + k] * point.step[k];
-      out.square_sum += row.weight * e * e;
+      for (int k = 0; k < 3; ++k) e[r] += row.row.j.point[3 * r + k] * point.step[k];
+      out.square_sum += row.weight * e[r] * e[r];
     }
   });
-}
-
-/// L^-T (w - L^-1 s).
-Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {
-  const auto at = [&](int i) { return factor[8 * i]; };
-  const double u0 = s[0] * at(0), u1 = (s[1] - at(1) * u0) * at(3);
-  const double u2 = (s[2] - at(2) * u0 - at(4) * u1) * at(5);
-  const double v0 = at(6) - u0, v1 = at(7) - u1, v2 = at(8) - u2;
-  const double d2 = v2 * at(5), d1 = (v1 - at(4) * d2) * at(3);
-  return {(v0 - at(1) * d1 - at(2) * d2) * at(0), d1, d2};
 }
 
 double point_damping(const ProductInput& in, const Chunk& chunk) {
@@ -109,13 +80,11 @@ double point_damping(const ProductInput& in, const Chunk& chunk) {
       Vector3<double> s{};
       for (std::uint32_t o = 0; o < group.track; ++o) {
         const WeightedRow row(in, g, group.first_batch + o, l);
-        for (int r = 0; r < 2; ++r)
-          for (int k = 0; k < 3; ++k)
-            s[k] += row.weight * row.j.point[3 * r + k] * row.camera_motion(r);
+        add_to_point(row.row, row.weight, camera_motion(row.row, row.record), s);
       }
       const double* factor = in.factors + kFactorGroup * g + l;
       const Vector3<double> d = back_substitute(factor, s);
-      for (int i = 0; i < 3; ++i) sum += d[i] * d[i] * factor[8 * (9 + i)];
+      for (int i = 0; i < 3; ++i) sum += d[i] * d[i] * factor[factor_group::damping(i)];
     }
   }
   return sum;

@@ -85,10 +85,12 @@ void pose_diagonal(const Chunks& chunks, const Chunk& chunk, const Records& reco
                    *C = records.C + kCRecord * chunks.diagonal[at];
       for (int i = 0; i < 6; ++i) {
         for (int e = 0; e < 2; ++e) {
-          for (int k = 0; k < 6; ++k) block[block_entry(i, k)] += C[8 * e + i] * C[8 * e + k];
-          block[block_right_side(i)] += C[8 * e + i] * C[8 * e + 6];
+          for (int k = 0; k < 6; ++k)
+            block[diagonal_layout::at(i, k)] += C[8 * e + i] * C[8 * e + k];
+          block[diagonal_layout::right_side(i)] += C[8 * e + i] * C[8 * e + 6];
         }
-        for (int c = 0; c < 3; ++c) block[block_squares(i)] += T[8 * c + i] * T[8 * c + i];
+        for (int c = 0; c < 3; ++c)
+          block[diagonal_layout::squares(i)] += T[8 * c + i] * T[8 * c + i];
       }
     }
   }
@@ -100,7 +102,7 @@ Vector3<double> coupling(const RowTrialInput& in, std::size_t g, std::uint32_t l
   Vector3<double> s{};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     const PointRow row = kept_row(in.rows, g, b, lane);
-    const double* step = in.steps + kStepRecord * in.batches->image[8 * b + lane];
+    const double* step = in.steps + kBlockVector * in.batches->image[8 * b + lane];
     for (std::size_t e = 0; e < 2; ++e) {
       double moved = 0;
       for (std::size_t k = 0; k < 9; ++k) moved += row.camera[e][k] * step[k];
@@ -116,7 +118,8 @@ void substitute_point(const RowTrialInput& in, std::size_t g, std::uint32_t lane
   if (lane < in.batches->groups[g].lanes) {  // others stay where they are
     const double* factor = in.factors + kFactorGroup * g + lane;
     d = back_substitute(factor, coupling(in, g, lane));
-    for (std::size_t i = 0; i < 3; ++i) out.damping_term += d[i] * d[i] * factor[8 * (9 + i)];
+    for (std::size_t i = 0; i < 3; ++i)
+      out.damping_term += d[i] * d[i] * factor[factor_group::damping(static_cast<int>(i))];
   }
   double moved = 0, size = 1e-300;
   for (std::size_t i = 0; i < 3; ++i) {

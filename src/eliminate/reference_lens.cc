@@ -62,21 +62,21 @@ std::vector<BlockOfPoint> sum_slots(const LensInput& in, const PointTrack& track
 void write_slot_record(const BlockOfPoint& sums, double* T) {
   std::fill_n(T, kTRecord, 0.0);
   for (int k = 0; k < 9; ++k)
-    for (int c = 0; c < 3; ++c) t_entry(T, c, k) = sums[std::size_t(k)][std::size_t(c)];
+    for (int c = 0; c < 3; ++c) T[t_record::at(c, k)] = sums[std::size_t(k)][std::size_t(c)];
 }
 
 /// C = Lm^T J and G = Lm^-1 (J - B T_l^T), two rows each of eight columns, then their ninths.
 void write_lens_record(const LensRow::Block& J, const WhitenedRow& m, const BlockOfPoint& T,
                        double* to) {
-  std::fill_n(to, kLensRecord, 0.0);
+  std::fill_n(to, kLensPairRecord, 0.0);
   for (std::size_t k = 0; k < 9; ++k) {
     std::array<double, 2> rest{J[0][k], J[1][k]};
     for (std::size_t e = 0; e < 2; ++e)
       for (std::size_t c = 0; c < 3; ++c) rest[e] -= m.B[e][c] * T[k][c];
     const std::array<double, 2> C = m.times_transpose(J[0][k], J[1][k]), G = m.times_inverse(rest);
     for (std::size_t e = 0; e < 2; ++e) {
-      to[k < 8 ? 8 * e + k : 32 + e] = C[e];
-      to[k < 8 ? 16 + 8 * e + k : 34 + e] = G[e];
+      to[k < 8 ? lens_pair_record::kC + 8 * e + k : lens_pair_record::kC8 + e] = C[e];
+      to[k < 8 ? lens_pair_record::kG + 8 * e + k : lens_pair_record::kG8 + e] = G[e];
     }
   }
 }
@@ -90,9 +90,10 @@ void add_to_sums(const LensRow& row, std::size_t j, const WhitenedRow& m, const 
     for (std::size_t c = 0; c < 3; ++c) rest += m.B[e][c] * p.w[c];
     for (int i = 0; i < 9; ++i) {
       const double x = J[e][std::size_t(i)];
-      sums[block_right_side(i)] += x * rest;
+      sums[diagonal_layout::right_side(i)] += x * rest;
       for (int k = 0; k < 9; ++k)
-        if (block_entry(i, k) != kNoEntry) sums[block_entry(i, k)] += x * J[e][std::size_t(k)];
+        if (diagonal_layout::is_stored(i, k))
+          sums[diagonal_layout::at(i, k)] += x * J[e][std::size_t(k)];
     }
   }
 }
@@ -101,9 +102,10 @@ void take_from_sums(const BlockOfPoint& T, double* sums) {
   for (std::size_t c = 0; c < 3; ++c)
     for (int i = 0; i < 9; ++i) {
       const double x = T[std::size_t(i)][c];
-      sums[block_squares(i)] += x * x;
+      sums[diagonal_layout::squares(i)] += x * x;
       for (int k = 0; k < 9; ++k)
-        if (block_entry(i, k) != kNoEntry) sums[block_entry(i, k)] -= x * T[std::size_t(k)][c];
+        if (diagonal_layout::is_stored(i, k))
+          sums[diagonal_layout::at(i, k)] -= x * T[std::size_t(k)][c];
     }
 }
 
@@ -140,7 +142,7 @@ void write_lens_records(const LensInput& in, const Chunk& chunk, const PointTrac
     for (std::size_t j = 0; j < blocks; ++j)
       write_lens_record(track.rows[o].lens[j], whitened[o],
                         slots[tracks.slot[8 * b + track.lane] + j],
-                        records.lens + kLensRecord * (most * record + j));
+                        records.lens + kLensPairRecord * (most * record + j));
   }
   const std::uint64_t observations = 8 * (chunk.end_batch - chunk.first_batch);
   const std::uint64_t first = observations + 8 * slots_before(tracks, chunk, track.group);
@@ -192,8 +194,8 @@ void pose_pairs(const Chunks& chunks, const Chunk& chunk, const Records& records
       for (int i = 0; i < 6; ++i)
         for (int k = 0; k < 6; ++k)
           for (int c = 0; c < 3; ++c)
-            tiles[kTileDoubles * run.tile + std::size_t(tile_entry(i, k))] +=
-                t_entry(a, c, i) * t_entry(b, c, k);
+            tiles[kTileDoubles * run.tile + std::size_t(tile_layout::at(i, k))] +=
+                a[t_record::at(c, i)] * b[t_record::at(c, k)];
     }
   }
 }

@@ -27,11 +27,11 @@ struct LensRow : PointRow {
   }
 };
 
-inline const double* image_record(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
-  return in.at.images + kLensStateRecord * in.batches->image[8 * batch + lane];
+inline const double* image_record_of(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
+  return in.at.images + kImageRecord * in.batches->image[8 * batch + lane];
 }
 inline const double* lens_record_of(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
-  return in.at.lenses + kLensStateRecord * in.tracks->lens[8 * batch + lane];
+  return in.at.lenses + kLensRecord * in.tracks->lens[8 * batch + lane];
 }
 inline const LensPlaces& lens_of(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
   return in.tracks->lenses[in.tracks->lens[8 * batch + lane]];
@@ -40,12 +40,12 @@ inline const LensPlaces& lens_of(const LensInput& in, std::uint64_t batch, std::
 /// With P = R X + t and A = du / dP:  du = A (rho + phi x P) + (du / dk) dk + A R dX.
 inline LensRow lens_row(const LensInput& in, const Vector3<double>& X, std::uint64_t batch,
                         std::uint32_t lane) {
-  const double* pose = image_record(in, batch, lane);
+  const double* pose = image_record_of(in, batch, lane);
   const LensPlaces& places = lens_of(in, batch, lane);
   Matrix3<double> R;
   std::copy(pose, pose + 9, R.begin());
   Vector3<double> P = multiply(R, X);
-  for (std::size_t i = 0; i < 3; ++i) P[i] += pose[9 + i];
+  for (std::size_t i = 0; i < 3; ++i) P[i] += pose[pose_record::kTranslation + i];
   LensRow row{};
   with_lens(places.model,
             [&](auto lens) { lens.project(lens_record_of(in, batch, lane), P.data(), row.J); });

@@ -12,18 +12,20 @@ using TwoRows = std::array<std::array<double, 9>, 2>;
 TwoRows image_C(const Records& records, std::size_t record) {
   const double *C = records.C + kCRecord * record, *T = records.T + kTRecord * record;
   TwoRows out;
-  for (std::size_t e = 0; e < 2; ++e)
-    for (std::size_t k = 0; k < 9; ++k) out[e][k] = k < 8 ? C[8 * e + k] : T[kNinthOfC + e];
+  for (int e = 0; e < 2; ++e)
+    for (int k = 0; k < 9; ++k) out[std::size_t(e)][std::size_t(k)] = c_entry(T, C, e, k);
   return out;
 }
 
 /// C of a lens's block, then G.
 std::array<TwoRows, 2> lens_C_and_G(const double* lens) {
+  using namespace lens_pair_record;
   std::array<TwoRows, 2> out;
-  for (std::size_t which = 0; which < 2; ++which)
-    for (std::size_t e = 0; e < 2; ++e)
-      for (std::size_t k = 0; k < 9; ++k)
-        out[which][e][k] = k < 8 ? lens[16 * which + 8 * e + k] : lens[32 + 2 * which + e];
+  for (std::size_t e = 0; e < 2; ++e)
+    for (std::size_t k = 0; k < 9; ++k) {
+      out[0][e][k] = lens[k < 8 ? kC + 8 * e + k : kC8 + e];
+      out[1][e][k] = lens[k < 8 ? kG + 8 * e + k : kG8 + e];
+    }
   return out;
 }
 
@@ -35,7 +37,7 @@ double dot(const TwoRows& a, int i, const TwoRows& b, int k) {
 /// tile -= row^T column; a tile holds what is taken away.
 void take_from_tile(const TwoRows& row, const TwoRows& column, double* tile) {
   for (int i = 0; i < 9; ++i)
-    for (int k = 0; k < 9; ++k) tile[tile_entry(i, k)] -= dot(row, i, column, k);
+    for (int k = 0; k < 9; ++k) tile[tile_layout::at(i, k)] -= dot(row, i, column, k);
 }
 
 /// What one observation adds to the blocks of its lens; record: of the chunk.
@@ -45,18 +47,19 @@ void add_observation(const LensTracks& tracks, const LensTiles& tiles_of, std::u
   const std::uint32_t lens = tracks.image_lens[image];
   const LensPlaces& places = tracks.lenses[lens];
   const double* own =
-      records.lens + kLensRecord * static_cast<std::size_t>(tracks.most_blocks) * record;
+      records.lens + kLensPairRecord * static_cast<std::size_t>(tracks.most_blocks) * record;
   const TwoRows C_image = image_C(records.image, record);
-  const double* h = records.image.T + kTRecord * record + kPlaceOfH;
+  const double* h = records.image.T + kTRecord * record + t_record::kH;
   for (std::size_t j = 0; j < places.blocks; ++j) {
-    const auto [C, G] = lens_C_and_G(own + kLensRecord * j);
+    const auto [C, G] = lens_C_and_G(own + kLensPairRecord * j);
     if (!tiles_of.of_image.empty())
       take_from_tile(G, C_image, tiles + kTileDoubles * tiles_of.of_image[2 * image + j]);
     double* block = diagonal + kDiagonalDoubles * (places.first_block + j);
     for (int i = 0; i < 9; ++i) {
       for (int k = 0; k < 9; ++k)
-        if (block_entry(i, k) != kNoEntry) block[block_entry(i, k)] += dot(C, i, G, k);
-      block[block_right_side(i)] += C[0][std::size_t(i)] * h[0] + C[1][std::size_t(i)] * h[1];
+        if (diagonal_layout::is_stored(i, k)) block[diagonal_layout::at(i, k)] += dot(C, i, G, k);
+      block[diagonal_layout::right_side(i)] +=
+          C[0][std::size_t(i)] * h[0] + C[1][std::size_t(i)] * h[1];
     }
     if (j == 1 && !tiles_of.of_lens.empty())
       take_from_tile(C, lens_C_and_G(own)[1], tiles + kTileDoubles * tiles_of.of_lens[lens]);
@@ -73,7 +76,8 @@ void add_slot_squares(const LensTracks& tracks, const Chunk& chunk, const double
     for (int i = 0; i < 9; ++i)
       for (int c = 0; c < 3; ++c)
         diagonal[kDiagonalDoubles * static_cast<std::size_t>(tracks.slot_block[at]) +
-                 static_cast<std::size_t>(block_squares(i))] += t_entry(T, c, i) * t_entry(T, c, i);
+                 static_cast<std::size_t>(diagonal_layout::squares(i))] +=
+            T[t_record::at(c, i)] * T[t_record::at(c, i)];
   }
 }
 

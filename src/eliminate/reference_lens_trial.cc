@@ -39,7 +39,7 @@ PointCost refine_point(const LensTrialInput& in, const Batches::Group& group, st
   for (int step = 0; step < in.inner_iterations; ++step) {
     Matrix3<double> A = best.normal.V;
     for (std::size_t i = 0; i < 3; ++i)
-      A[4 * i] += inner_iterations::kDamping * factor[8 * (9 + i)];
+      A[4 * i] += inner_iterations::kDamping * factor[factor_group::damping(static_cast<int>(i))];
     const Factor3 f = Factor3::of(A);
     const Vector3<double> w = f.forward(best.normal.g.data());
     const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
@@ -56,8 +56,8 @@ PointCost refine_point(const LensTrialInput& in, const Batches::Group& group, st
 /// Jc dc of the step that the records hold.
 std::array<double, 2> step_of_camera(const LensInput& in, const LensRow& row, std::uint64_t batch,
                                      std::uint32_t lane) {
-  const double* pose = image_record(in, batch, lane) + lens_record::kPoseStep;
-  const double* dk = lens_record_of(in, batch, lane) + lens_record::kParameterStep;
+  const double* pose = image_record_of(in, batch, lane) + image_record::kStep;
+  const double* dk = lens_record_of(in, batch, lane) + lens_record::kStep;
   const std::size_t parameters = parameter_count(lens_of(in, batch, lane).model);
   std::array<double, 2> e{};
   for (std::size_t r = 0; r < 2; ++r) {
@@ -97,7 +97,7 @@ void try_point(const LensTrialInput& in, std::size_t g, std::uint32_t lane, Tria
     const Vector3<double> d = step_of_point(in, g, lane, X);
     for (std::size_t i = 0; i < 3; ++i) {
       Y[i] += d[i];
-      out.damping_term += d[i] * d[i] * factor[8 * (9 + i)];
+      out.damping_term += d[i] * d[i] * factor[factor_group::damping(static_cast<int>(i))];
     }
     const PointCost cost = refine_point(in, group, lane, factor, Y);
     out.square_sum += cost.square;

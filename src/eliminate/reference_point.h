@@ -48,10 +48,10 @@ struct EliminatedPoint {
   double decrease() const { return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]; }
   /// To a lane of kFactorGroup.
   void store(double* out) const {
-    std::array<double, 12> all{1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22,
-                               w[0],      w[1],  w[2],  D[0],      D[1],  D[2]};
+    std::array<double, factor_group::kFields> all{
+        1 / f.l00, f.l10, f.l20, 1 / f.l11, f.l21, 1 / f.l22, w[0], w[1], w[2], D[0], D[1], D[2]};
     if (f.held) all.fill(0);
-    for (std::size_t i = 0; i < 12; ++i) out[8 * i] = all[i];
+    for (std::size_t i = 0; i < all.size(); ++i) out[8 * i] = all[i];
   }
 };
 
@@ -86,34 +86,18 @@ struct WhitenedRow {
   }
 };
 
-/// Entry k of column c of a T record: rows 0..7 of the three columns, then row 8 of each.
-inline double& t_entry(double* T, int c, int k) { return k < 8 ? T[8 * c + k] : T[24 + c]; }
-inline double t_entry(const double* T, int c, int k) { return k < 8 ? T[8 * c + k] : T[24 + c]; }
-/// Entry k of row e of a C record, the ninths of which stand in T; and where h is.
-constexpr int kNinthOfC = 28, kPlaceOfH = 30;
-
 /// T = Jc^T B, C = Lm^T Jc and h, as records have them.
 inline void write_point_records(const PointRow& row, const WhitenedRow& m, double* T, double* C) {
   for (int k = 0; k < 9; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const double j0 = row.camera[0][i], j1 = row.camera[1][i];
     for (int c = 0; c < 3; ++c)
-      t_entry(T, c, k) = j0 * m.B[0][std::size_t(c)] + j1 * m.B[1][std::size_t(c)];
+      T[t_record::at(c, k)] = j0 * m.B[0][std::size_t(c)] + j1 * m.B[1][std::size_t(c)];
     const std::array<double, 2> column = m.times_transpose(j0, j1);
-    for (int e = 0; e < 2; ++e) (k < 8 ? C[8 * e + k] : T[kNinthOfC + e]) = column[std::size_t(e)];
+    for (int e = 0; e < 2; ++e) c_entry(T, C, e, k) = column[std::size_t(e)];
   }
-  T[27] = 0;
-  T[kPlaceOfH] = m.h[0], T[kPlaceOfH + 1] = m.h[1];
+  T[t_record::kRow8 + 3] = 0;
+  T[t_record::kH] = m.h[0], T[t_record::kH + 1] = m.h[1];
 }
-
-/// Where entry (i, k) of a 9 x 9 sum stands: in the square, in row 8 or column 8 beside it, or in
-/// the corner. Diagonal blocks have no column 8, as they are symmetric.
-constexpr int tile_entry(int i, int k) {
-  return i < 8 && k < 8 ? 8 * i + k : i == 8 && k == 8 ? 80 : i == 8 ? 64 + k : 72 + i;
-}
-constexpr int kNoEntry = -1;
-constexpr int block_entry(int i, int k) { return k < 8 ? 8 * i + k : i == 8 ? 88 : kNoEntry; }
-constexpr int block_right_side(int i) { return i < 8 ? 72 + i : 89; }
-constexpr int block_squares(int i) { return i < 8 ? 80 + i : 90; }
 
 }  // namespace sheaf

@@ -19,13 +19,16 @@ struct Observed {
   BalCamera<double> camera;
 };
 
-inline Observed camera_of(const double* cameras, std::uint32_t image) {
-  const double* c = cameras + kCameraRecord * image;
+inline Observed camera_at(const double* c) {
   Observed o;
   std::copy(c, c + 9, o.R.begin());
-  std::copy(c + 9, c + 12, o.t.begin());
-  o.camera = {c[12], c[13], c[14]};
+  std::copy_n(c + camera_record::kTranslation, 3, o.t.begin());
+  const double* lens = c + camera_record::kFocal;
+  o.camera = {lens[0], lens[1], lens[2]};
   return o;
+}
+inline Observed camera_of(const double* cameras, std::uint32_t image) {
+  return camera_at(cameras + kCameraRecord * image);
 }
 
 inline Vector3<double> point_of(const double* points, std::size_t group, std::uint32_t lane) {
@@ -94,6 +97,12 @@ struct Factor3 {
   }
 };
 
+/// Entry k of C's rows: 8 + 1 storage undone.
+template <class Number>
+Number& c_entry(Number* T, Number* C, int row, int k) {
+  return k < 8 ? C[c_record::row(row) + k] : T[t_record::kC8 + row];
+}
+
 /// The base of a point's chart.
 inline Vector3<double> base_of(const ChartRules& rules, const Batches& batches,
                                const Batches::Group& group, std::uint32_t lane,
@@ -152,12 +161,17 @@ struct PointCoordinates {
   }
 };
 
-/// Jc dc, from the step in the camera record: phi, rho, df, k1 df + f dk1, k2 df + f dk2.
+/// The columns of the step in a camera record.
+inline std::array<double, 9> step_of(const double* record) {
+  const double *lens = record + camera_record::kFocal, *rho = record + camera_record::kRho;
+  const double *phi = record + camera_record::kPhi, *s = record + camera_record::kRadial;
+  const double dk1 = (s[1] - lens[1] * s[0]) / lens[0], dk2 = (s[2] - lens[2] * s[0]) / lens[0];
+  return {rho[0], rho[1], rho[2], phi[0], phi[1], phi[2], s[0], dk1, dk2};
+}
+
+/// Jc dc, from the step in the camera record.
 inline std::array<double, 2> camera_motion(const Row& row, const double* record) {
-  const double* s = record + camera_record::kStep;
-  const double f = record[12];
-  const double dk1 = (s[7] - record[13] * s[6]) / f, dk2 = (s[8] - record[14] * s[6]) / f;
-  const std::array<double, 9> dc{s[3], s[4], s[5], s[0], s[1], s[2], s[6], dk1, dk2};
+  const std::array<double, 9> dc = step_of(record);
   std::array<double, 2> e{};
   for (int r = 0; r < 2; ++r)
     for (int k = 0; k < 9; ++k) e[r] += row.j.camera[9 * r + k] * dc[k];

@@ -55,7 +55,8 @@ PointCost refine_point(const TrialInput& in, const Batches::Group& group, std::u
     const PointCost there = cost_of(in, group, stay, lane);
     if (!(best.cost <= there.cost)) X = stay, best = there;
   }
-  const Vector3<double> D{factor[72], factor[80], factor[88]};
+  const Vector3<double> D{factor[factor_group::damping(0)], factor[factor_group::damping(1)],
+                          factor[factor_group::damping(2)]};
   for (int step = 0; step < in.inner_iterations; ++step) {
     const PointCoordinates at(in.chart, base, X);
     Matrix3<double> A = best.V;

@@ -21,7 +21,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-constexpr std::size_t kRowPart = kJacobianFields * kLanes;
+constexpr std::size_t kRowPart = row_field::kCount * kLanes;
 static_assert(kRowBatch == kRowPart * kParts);
 
 /// Where the rows of a group's part come from: from where they are stored ...
@@ -145,18 +145,19 @@ void pose_diagonal(const Chunks& chunks, const Chunk& chunk, const Records& from
         const double* c = from.C + kCRecord * records[o];
         const double* t = from.T + kTRecord * records[o] + column;
         add_outer6(c, load(c + column), first);
-        add_outer6(c + 8, load(c + 8 + column), second);
+        add_outer6(c + c_record::row(1), load(c + c_record::row(1) + column), second);
         for (int q = 0; q < 3; ++q) {
-          const V of = load(t + 8 * q);
+          const V of = load(t + t_record::column(q));
           squares[q] = fma(of, of, squares[q]);
         }
       }
       for (int k = 0; k < 6; ++k) store(hn::Add(first[k], second[k]), products[k] + column);
-      add_to(hn::Add(squares[0], hn::Add(squares[1], squares[2])), block + 80 + column);
+      add_to(hn::Add(squares[0], hn::Add(squares[1], squares[2])),
+             block + diagonal_layout::kSquares + column);
     }
     for (int k = 0; k < 6; ++k) {
-      for (int c = 0; c < 6; ++c) block[8 * k + c] += products[k][c];
-      block[72 + k] += products[k][6];
+      for (int c = 0; c < 6; ++c) block[diagonal_layout::at(k, c)] += products[k][c];
+      block[diagonal_layout::right_side(k)] += products[k][6];
     }
   }
 }
@@ -174,14 +175,14 @@ HWY_INLINE void add_row_coupling(const LaneJacobian& j, const V* step, V* s) {
 HWY_INLINE void load_steps(const double* steps, const std::uint32_t* block, std::int32_t uniform,
                            V* x) {
   if (uniform >= 0) {
-    const double* record = steps + kStepRecord * static_cast<std::size_t>(uniform);
+    const double* record = steps + kBlockVector * static_cast<std::size_t>(uniform);
     broadcast_record(record, x);
     x[8] = set(record[8]);
     return;
   }
-  load_records(steps, kStepRecord, block, x);
+  load_records(steps, kBlockVector, block, x);
   alignas(64) double last[8];
-  for (int l = 0; l < kLanes; ++l) last[l] = steps[kStepRecord * block[l] + 8];
+  for (int l = 0; l < kLanes; ++l) last[l] = steps[kBlockVector * block[l] + 8];
   x[8] = load(last);
 }
 

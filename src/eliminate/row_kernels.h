@@ -6,7 +6,7 @@
 
 #include "eliminate/kernels.h"
 #include "rows/photometric.h"
-#include "rows/row_store.h"
+#include "rows/row_layout.h"
 
 namespace sheaf {
 
@@ -27,13 +27,10 @@ struct StoredRowsInput {
   bool poses;  ///< blocks are poses alone: records are for pose_diagonal and pose pairs
 };
 
-/// A camera block's step as back-substitution reads it: nine columns, seven unused.
-constexpr std::size_t kStepRecord = 16;
-
 struct RowTrialInput {
   const Batches* batches;
   KeptRows rows;
-  const double* steps;    ///< kStepRecord per block
+  const double* steps;    ///< kBlockVector per block
   const double* points;   ///< held
   const double* factors;  ///< as elimination left them
 };

@@ -16,17 +16,13 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// What the second sweep over a point's track needs from the first: iz, p, f d, dd and e, kept as
-/// this many vectors, and the rotation.
-constexpr int kSweepFields = 7;
-
 /// e = w Jc x of one observation per lane (also saved), and s += Jp^T e; weight: nullptr for w = 1
 /// in all lanes.
 template <class C, class W>
 HWY_INLINE void first_sweep(const C& c, W X0, W X1, W X2, const W* weight, hn::TFromV<W>* saved,
                             W* s) {
   const SeenAs<W> seen = see(c, X0, X1, X2);
-  const W fd = hn::Mul(c[12], distortion(c, seen.n));
+  const W fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
   const W dd = distortion_slope(c, seen.n);
   W e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
@@ -110,8 +106,9 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
     V s[3] = {zero(), zero(), zero()};
     for (std::uint32_t o = 0; o < group.track; ++o) {
       const std::uint64_t b = group.first_batch + o;
-      V c[24];
-      load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+      V c[kCameraRecord];
+      load_cameras<camera_record::kOctets>(in.cameras, &batches.image[8 * b + lane],
+                                           batches.uniform[b], c);
       double* to = saved + kPart * (kParts * o + part);
       for (int i = 0; i < 9; ++i) store(c[i], to + i * kLanes);
       V weight = mask;

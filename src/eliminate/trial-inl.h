@@ -20,16 +20,17 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// e = Jc dc of one observation per lane; c holds the 24 fields of camera and step.
+/// e = Jc dc of one observation per lane; c: the fields of its camera record.
 template <class C, class W>
 HWY_INLINE void camera_motion(const C& c, const SeenAs<W>& seen, W fd, W dd, W& e0, W& e1) {
   // dP = phi x P + rho, d p = iz (dP.xy + p dP.z), and iz P = (x, y, -1).
-  const W m0 = fnma(c[17], seen.y, fms(seen.iz, c[18], c[16]));
-  const W m1 = fma(c[17], seen.x, fma(seen.iz, c[19], c[15]));
-  const W m2 = fnma(c[16], seen.x, fma(c[15], seen.y, hn::Mul(seen.iz, c[20])));
+  using namespace camera_record;
+  const W m0 = fnma(c[kPhi + 2], seen.y, fms(seen.iz, c[kRho], c[kPhi + 1]));
+  const W m1 = fma(c[kPhi + 2], seen.x, fma(seen.iz, c[kRho + 1], c[kPhi]));
+  const W m2 = fnma(c[kPhi + 1], seen.x, fma(c[kPhi], seen.y, hn::Mul(seen.iz, c[kRho + 2])));
   const W dx = fma(seen.x, m2, m0);
   const W dy = fma(seen.y, m2, m1);
-  const W intrinsic = fma(seen.n, fma(seen.n, c[23], c[22]), c[21]);
+  const W intrinsic = fma(seen.n, fma(seen.n, c[kRadial + 2], c[kRadial + 1]), c[kRadial]);
   const W along = fma(dd, fma(seen.x, dx, hn::Mul(seen.y, dy)), intrinsic);
   e0 = fma(fd, dx, hn::Mul(along, seen.x));
   e1 = fma(fd, dy, hn::Mul(along, seen.y));
@@ -47,7 +48,7 @@ HWY_INLINE void add_to_point(const C& c, const SeenAs<W>& seen, W fd, W dd, W e0
 
 /// s += Jp^T w Jc dc of one observation per lane; weights: nullptr for w = 1.
 HWY_INLINE void add_coupled(const V* c, const Seen& seen, const double* weights, V* s) {
-  const V fd = hn::Mul(c[12], distortion(c, seen.n));
+  const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
   const V dd = distortion_slope(c, seen.n);
   V e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
@@ -63,7 +64,7 @@ struct TrialSums {
 };
 
 HWY_INLINE V squared_residual(const V* c, const Seen& s, V zx, V zy) {
-  const V fd = hn::Mul(c[12], distortion(c, s.n));
+  const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, s.n));
   const V r0 = fms(fd, s.x, zx), r1 = fms(fd, s.y, zy);
   return fma(r0, r0, hn::Mul(r1, r1));
 }
@@ -79,7 +80,8 @@ HWY_INLINE void prefetch_groups(const double* points, const double* factors, int
 }
 
 HWY_INLINE Factor load_factor(const double* pd) {
-  return {load(pd), load(pd + 8), load(pd + 16), load(pd + 24), load(pd + 32), load(pd + 40)};
+  const auto field = [pd](int i) { return load(pd + factor_group::factor(i)); };
+  return {field(0), field(1), field(2), field(3), field(4), field(5)};
 }
 
 /// L^-T u.
@@ -103,22 +105,24 @@ HWY_INLINE V back_substitute(const double* pd, const V* s, V* d) {
   const Factor f = load_factor(pd);
   V u[3];
   forward(f, s, u);
-  for (int i = 0; i < 3; ++i) u[i] = hn::Sub(load(pd + 8 * (6 + i)), u[i]);
+  for (int i = 0; i < 3; ++i) u[i] = hn::Sub(load(pd + factor_group::w(i)), u[i]);
   backward(f, u, d);
   V sum = zero();
-  for (int i = 0; i < 3; ++i) sum = fma(hn::Mul(d[i], d[i]), load(pd + 8 * (9 + i)), sum);
+  for (int i = 0; i < 3; ++i)
+    sum = fma(hn::Mul(d[i], d[i]), load(pd + factor_group::damping(i)), sum);
   return sum;
 }
 
 /// gradient = L w = -Jp^T r, and lambda D^-1 of it.
 HWY_INLINE void descend_point(const double* pd, V lambda, V* gradient, V* step) {
   const Factor f = load_factor(pd);
-  const V w0 = load(pd + 48), w1 = load(pd + 56), w2 = load(pd + 64);
+  const V w0 = load(pd + factor_group::w(0)), w1 = load(pd + factor_group::w(1)),
+          w2 = load(pd + factor_group::w(2));
   gradient[0] = hn::Div(w0, f.i00);
   gradient[1] = fma(f.l10, w0, hn::Div(w1, f.i11));
   gradient[2] = fma(f.l20, w0, fma(f.l21, w1, hn::Div(w2, f.i22)));
   for (int i = 0; i < 3; ++i)
-    step[i] = hn::Div(hn::Mul(lambda, gradient[i]), load(pd + 8 * (9 + i)));
+    step[i] = hn::Div(hn::Mul(lambda, gradient[i]), load(pd + factor_group::damping(i)));
 }
 
 HWY_INLINE void blend_step(const PointBlend& blend, const double* pd, V* d) {
@@ -148,8 +152,9 @@ HWY_INLINE TrackCost pass_group(const TrialInput& in, const Batches::Group& grou
   V square = zero(), cost = zero();
   if (kLinearize) sums.clear();
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-    V c[16];
-    load_cameras<2>(in.trial_cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    V c[8 * camera_record::kStateOctets];
+    load_cameras<camera_record::kStateOctets>(in.trial_cameras, &batches.image[8 * b + lane],
+                                              batches.uniform[b], c);
     const double* z = &batches.xy[16 * b + lane];
     if (kLinearize) {
       LaneJacobian j = linearize_lanes(c, X0, X1, X2, load(z), load(z + 8), nullptr);
@@ -209,9 +214,9 @@ HWY_INLINE void refine_points(const TrialInput& in, const Batches::Group& group,
   const V worth_more = set(inner_iterations::kWorthMore * mean);
   const V weak = set(in.blend.inner_damping);
   for (int steps_left = in.inner_iterations; steps_left > 0;) {
-    const Factor f =
-        factor3(fma(weak, load(pd + 72), p.v00), p.v01, p.v02, fma(weak, load(pd + 80), p.v11),
-                p.v12, fma(weak, load(pd + 88), p.v22));
+    const Factor f = factor3(fma(weak, load(pd + factor_group::damping(0)), p.v00), p.v01, p.v02,
+                             fma(weak, load(pd + factor_group::damping(1)), p.v11), p.v12,
+                             fma(weak, load(pd + factor_group::damping(2)), p.v22));
     V w[3], d[3];
     forward(f, p.g, w);
     backward(f, w, d);
@@ -247,10 +252,10 @@ HWY_INLINE V count_crossed(const TrialInput& in, const Batches::Group& group, in
   V behind = zero();
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     const std::uint32_t* image = &batches.image[8 * b + lane];
-    V c[16];
-    load_cameras<2>(in.trial_cameras, image, batches.uniform[b], c);
+    V c[8 * camera_record::kStateOctets];
+    load_cameras<camera_record::kStateOctets>(in.trial_cameras, image, batches.uniform[b], c);
     const V P2 = see(c, after.X0, after.X1, after.X2).P2;
-    load_cameras<2>(in.cameras, image, batches.uniform[b], c);
+    load_cameras<camera_record::kStateOctets>(in.cameras, image, batches.uniform[b], c);
     const V held = see(c, before[0], before[1], before[2]).P2;
     const auto crossed = hn::And(hn::Gt(P2, zero()), hn::Le(held, zero()));
     behind = hn::Add(behind, hn::IfThenElseZero(crossed, set(1.0)));
@@ -273,7 +278,7 @@ struct ChartedStep {
     V q[3], e[3], to[3], damping = zero();
     from.coordinates(d, q);
     for (int i = 0; i < 3; ++i) {
-      damping = fma(hn::Mul(q[i], q[i]), load(pd + 8 * (9 + i)), damping);
+      damping = fma(hn::Mul(q[i], q[i]), load(pd + factor_group::damping(i)), damping);
       e[i] = hn::Sub(d[i], hn::Sub(moved[i], base[i]));
       stay[i] = hn::Add(moved[i], from.Y[i]);
     }
@@ -303,8 +308,9 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
   V s[3] = {zero(), zero(), zero()};
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
-    V c[24];
-    load_cameras<3>(in.cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+    V c[kCameraRecord];
+    load_cameras<camera_record::kOctets>(in.cameras, &batches.image[8 * b + lane],
+                                         batches.uniform[b], c);
     add_coupled(c, see(c, X[0], X[1], X[2]), Robust ? in.weights + 8 * b + lane : nullptr, s);
   }
   V d[3];
@@ -363,11 +369,12 @@ inline void residuals_chunk(const Batches& batches, const double* cameras, const
     for (int lane = 0; lane < 8; lane += kLanes) {
       const double* X = points + kPointGroup * g + lane;
       for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-        V c[16];
-        load_cameras<2>(cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+        V c[8 * camera_record::kStateOctets];
+        load_cameras<camera_record::kStateOctets>(cameras, &batches.image[8 * b + lane],
+                                                  batches.uniform[b], c);
         const double* z = &batches.xy[16 * b + lane];
         const Seen seen = see(c, load(X), load(X + 8), load(X + 16));
-        const V fd = hn::Mul(c[12], distortion(c, seen.n));
+        const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
         double* to = out + 16 * (b - chunk.first_batch) + lane;
         store(hn::Abs(fms(fd, seen.x, load(z))), to);
         store(hn::Abs(fms(fd, seen.y, load(z + 8))), to + 8);
@@ -388,8 +395,9 @@ inline double square_sum_chunk(const Batches& batches, const double* cameras, co
       V square = zero();
       for (std::uint32_t o = 0; o < group.track; ++o) {
         const std::uint64_t b = group.first_batch + o;
-        V c[16];
-        load_cameras<2>(cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
+        V c[8 * camera_record::kStateOctets];
+        load_cameras<camera_record::kStateOctets>(cameras, &batches.image[8 * b + lane],
+                                                  batches.uniform[b], c);
         const double* z = &batches.xy[16 * b + lane];
         const Seen seen = see(c, load(X), load(X + 8), load(X + 16));
         square = hn::Add(square, squared_residual(c, seen, load(z), load(z + 8)));
@@ -413,9 +421,11 @@ inline std::uint64_t count_behind_chunk(const Batches& batches, const double* ca
       const V X0 = load(X), X1 = load(X + 8), X2 = load(X + 16);
       const V one = group.lanes < 8 ? lane_mask(group.lanes, lane) : set(1.0);
       for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-        V c[16];
-        load_cameras<2>(cameras, &batches.image[8 * b + lane], batches.uniform[b], c);
-        const V depth = fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[11])));
+        V c[8 * camera_record::kStateOctets];
+        load_cameras<camera_record::kStateOctets>(cameras, &batches.image[8 * b + lane],
+                                                  batches.uniform[b], c);
+        const V depth =
+            fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[camera_record::kTranslation + 2])));
         sums[p] = hn::Add(sums[p], hn::IfThenElseZero(hn::Gt(depth, zero()), one));
       }
     }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "lists/block_layout.h"
 #include "lists/slices.h"
 #include "platform/parallel.h"
 #include "platform/shared_word.h"

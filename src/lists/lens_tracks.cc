@@ -47,6 +47,8 @@ void place_lenses(const Problem& problem, const Fixed& fixed, LensTracks& out) {
     out.most_blocks = std::max<int>(out.most_blocks, lens.blocks);
     for (std::size_t j = 0; j < 2; ++j)
       out.most_width[j] = std::max(out.most_width[j], lens.width[j]);
+    out.most_parameters =
+        std::max(out.most_parameters, static_cast<int>(parameter_count(lens.model)));
     out.lenses.push_back(lens);
   }
 }

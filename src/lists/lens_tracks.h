@@ -40,6 +40,7 @@ struct LensTracks {
   std::vector<LensPlaces> kinds;             ///< one lens of each kind
   std::uint32_t num_blocks = 0;              ///< of images and of lenses
   int most_blocks = 0;                       ///< of any lens
+  int most_parameters = 0;                   ///< of any lens's model
   std::array<std::uint8_t, 2> most_width{};  ///< of any lens's first and second block
 
   Buffer<std::uint32_t> lens;         ///< 8 per batch

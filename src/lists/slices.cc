@@ -18,10 +18,6 @@ void add_slices(Buffer<double>& sums, std::size_t slices, Threads& threads) {
   });
 }
 
-double linearize_flops(std::uint64_t batches, std::uint64_t pairs) {
-  return 8.0 * 700 * static_cast<double>(batches) + 490.0 * static_cast<double>(pairs);
-}
-
 int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
   constexpr double kFlopsPerSlice = 15e6, kBytes = 96e6;
   const double sums = 8.0 * (kTileDoubles * static_cast<double>(tiles) +

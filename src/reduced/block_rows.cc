@@ -33,17 +33,18 @@ void multiply(const double* blocks, const std::uint32_t* image, std::size_t coun
   for (int p = 0; p < kParts; ++p) sums[p] = last[p] = zero();
   double corner = 0;
   for (std::size_t e = 0; e < count; ++e, blocks += kBlockEntry) {
-    const double* v = x + 16 * static_cast<std::size_t>(image[e]);
+    const double* v = x + kBlockVector * static_cast<std::size_t>(image[e]);
     for (int p = 0; p < kParts; ++p) {
       const double* from = blocks + p * kLanes;
       // Two chains, so that one block does not wait nine times for its own sum.
-      V even = sums[p], odd = hn::Mul(load(from + 8), set(v[1]));
-      for (int k = 0; k < 9; k += 2) even = fma(load(from + 8 * k), set(v[k]), even);
-      for (int k = 3; k < 9; k += 2) odd = fma(load(from + 8 * k), set(v[k]), odd);
+      V even = sums[p], odd = hn::Mul(load(from + block_entry::at(0, 1)), set(v[1]));
+      for (int k = 0; k < 9; k += 2)
+        even = fma(load(from + block_entry::at(0, k)), set(v[k]), even);
+      for (int k = 3; k < 9; k += 2) odd = fma(load(from + block_entry::at(0, k)), set(v[k]), odd);
       sums[p] = hn::Add(even, odd);
-      last[p] = fma(load(from + 72), load(v + p * kLanes), last[p]);
+      last[p] = fma(load(from + block_entry::kRow8), load(v + p * kLanes), last[p]);
     }
-    corner += blocks[80] * v[8];
+    corner += blocks[block_entry::kCorner] * v[8];
   }
   finish_row(sums, last, corner, y);
 }
@@ -73,19 +74,20 @@ void multiply_float(const float* blocks, const std::uint32_t* image, std::size_t
   for (int p = 0; p < kParts; ++p) sums[p] = last[p] = zero();
   double corner = 0;
   for (std::size_t e = 0; e < count; ++e, blocks += kBlockEntry) {
-    const float* v = x + 16 * static_cast<std::size_t>(image[e]);
+    const float* v = x + kBlockVector * static_cast<std::size_t>(image[e]);
     for (int i = 0; i < 8; i += kFloatLanes) {
       const float* from = blocks + i;
       auto even = hn::Mul(hn::Load(d, from), hn::Set(d, v[0]));
-      auto odd = hn::Mul(hn::Load(d, from + 8), hn::Set(d, v[1]));
+      auto odd = hn::Mul(hn::Load(d, from + block_entry::at(0, 1)), hn::Set(d, v[1]));
       for (int k = 2; k < 9; k += 2)
-        even = hn::MulAdd(hn::Load(d, from + 8 * k), hn::Set(d, v[k]), even);
+        even = hn::MulAdd(hn::Load(d, from + block_entry::at(0, k)), hn::Set(d, v[k]), even);
       for (int k = 3; k < 9; k += 2)
-        odd = hn::MulAdd(hn::Load(d, from + 8 * k), hn::Set(d, v[k]), odd);
+        odd = hn::MulAdd(hn::Load(d, from + block_entry::at(0, k)), hn::Set(d, v[k]), odd);
       add_floats(hn::Add(even, odd), sums + i / kLanes);
-      add_floats(hn::Mul(hn::Load(d, from + 72), hn::Load(d, v + i)), last + i / kLanes);
+      add_floats(hn::Mul(hn::Load(d, from + block_entry::kRow8), hn::Load(d, v + i)),
+                 last + i / kLanes);
     }
-    corner += static_cast<double>(blocks[80]) * static_cast<double>(v[8]);
+    corner += static_cast<double>(blocks[block_entry::kCorner]) * static_cast<double>(v[8]);
   }
   finish_row(sums, last, corner, y);
 }

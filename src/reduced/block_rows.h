@@ -5,14 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "lists/block_layout.h"
+
 namespace sheaf {
 
-/// A 9x9 block of numbers, float or double: nine columns of rows 0..7 (8 k + r), then row 8 (72 +
-/// k), 7 unused.
-constexpr std::size_t kBlockEntry = 88;
-
-/// One instruction set's product of a row of blocks with the vectors of the images they stand for,
-/// 16 numbers each of which nine are used. Sums over blocks are double, in their order.
+/// One instruction set's product of a row of blocks, kBlockEntry each, with the vectors of the
+/// images they stand for, kBlockVector each. Sums over blocks are double, in their order.
 struct BlockRowKernels {
   const char* name;
   /// y <- sum over `count` blocks of block x[image].

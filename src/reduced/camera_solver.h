@@ -22,11 +22,6 @@ struct ReducedSums {
   const double* diagonal;  ///< kDiagonalDoubles per image
 };
 
-/// Entry (r, k) of an image's symmetric diagonal block, stored 8 + 1.
-double diagonal_entry(const double* block, int r, int k);
-/// Entry (r, k) of a tile: row image's r, column image's k.
-double tile_entry(const double* tile, int r, int k);
-
 /// Right-hand side b and diag(J^T J) of the free columns.
 struct CameraVectors {
   Buffer<double> rhs, squares;

@@ -100,10 +100,9 @@ void CoarseSpace::place(const double* cameras) {
   for (std::size_t i = 0; i < columns_.num_images(); ++i) {
     const std::int32_t to = clusters_.of_image[i];
     if (to == Clusters::kNone) continue;
-    const double* c = cameras + kCameraRecord * i;
+    const double *c = cameras + kCameraRecord * i, *t = c + camera_record::kTranslation;
     ++members[to];
-    for (int k = 0; k < 3; ++k)
-      centres_[to][k] -= c[k] * c[9] + c[3 + k] * c[10] + c[6 + k] * c[11];
+    for (int k = 0; k < 3; ++k) centres_[to][k] -= c[k] * t[0] + c[3 + k] * t[1] + c[6 + k] * t[2];
   }
   for (std::int32_t c = 0; c < clusters_.count; ++c)
     for (double& x : centres_[c]) x /= members[c];
@@ -124,7 +123,7 @@ void CoarseSpace::place_image(std::size_t image, const double* camera) {
   if (cluster == Clusters::kNone) return;
   double q[3];
   for (int r = 0; r < 3; ++r) {
-    q[r] = camera[9 + r];
+    q[r] = camera[camera_record::kTranslation + r];
     for (int k = 0; k < 3; ++k) q[r] += camera[3 * r + k] * centres_[cluster][k];
   }
   for (int m = 0; m < 3; ++m) {

@@ -21,7 +21,7 @@ class ImageOperator {
   /// Both 16 doubles per image, nine of them used.
   virtual void apply(const double* x, double* y) = 0;
 };
-constexpr std::size_t kImageVector = 16;
+constexpr std::size_t kImageVector = kBlockVector;
 
 /// Preconditioned conjugate gradients on (P^T S P + D) x = b with P the numbering of columns.
 /// Stops when an iteration's part of the decrease Q = -1/2 x.(b + r) of the quadratic model falls

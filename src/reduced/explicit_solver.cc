@@ -62,9 +62,7 @@ class ExplicitOperator : public ImageOperator {
     in_tasks(chunks_.tiles.size(), [&](std::size_t t) {
       const double* tile = system.sums.tiles + kTileDoubles * t;
       const Tile& at = chunks_.tiles[t];
-      const auto entry = [tile](int r, int k) {
-        return -(k < 8 ? tile[8 * r + k] : tile[r < 8 ? 72 + r : 80]);
-      };
+      const auto entry = [tile](int r, int k) { return -tile_entry(tile, r, k); };
       fill(of_tile_[2 * t], at.row, at.column, entry);
       fill(of_tile_[2 * t + 1], at.column, at.row, [&](int r, int k) { return entry(k, r); });
     });
@@ -100,9 +98,9 @@ class ExplicitOperator : public ImageOperator {
                  *k_scale = &scales_[kImageVector * column];
     for (int k = 0; k < 9; ++k)
       for (int r = 0; r < 8; ++r)
-        to[8 * k + r] = static_cast<T>(entry(r, k) * (r_scale[r] * k_scale[k]));
+        to[block_entry::at(r, k)] = static_cast<T>(entry(r, k) * (r_scale[r] * k_scale[k]));
     for (int k = 0; k < 9; ++k)
-      to[72 + k] = static_cast<T>(entry(8, k) * (r_scale[8] * k_scale[k]));
+      to[block_entry::at(8, k)] = static_cast<T>(entry(8, k) * (r_scale[8] * k_scale[k]));
   }
 
   void multiply(const double* blocks, const std::uint32_t* image, std::size_t count, double* y) {

@@ -149,15 +149,15 @@ class SparseSolver : public CameraSolver {
   }
   static void place_whole(const double* tile, double* to, std::size_t lda) {
     for (int k = 0; k < 8; ++k) {
-      for (int r = 0; r < 8; ++r) to[k * lda + r] -= tile[8 * r + k];
-      to[k * lda + 8] -= tile[64 + k];
+      for (int r = 0; r < 8; ++r) to[k * lda + r] -= tile_entry(tile, r, k);
+      to[k * lda + 8] -= tile_entry(tile, 8, k);
     }
-    for (int r = 0; r < 9; ++r) to[8 * lda + r] -= tile[72 + r];
+    for (int r = 0; r < 9; ++r) to[8 * lda + r] -= tile[tile_layout::kColumn8 + r];
   }
   static void place_transposed(const double* tile, double* to, std::size_t lda) {
     for (int r = 0; r < 9; ++r) {
-      for (int k = 0; k < 8; ++k) to[r * lda + k] -= tile[8 * r + k];
-      to[r * lda + 8] -= tile[72 + r];
+      for (int k = 0; k < 8; ++k) to[r * lda + k] -= tile_entry(tile, r, k);
+      to[r * lda + 8] -= tile[tile_layout::kColumn8 + r];
     }
   }
 

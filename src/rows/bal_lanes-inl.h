@@ -27,9 +27,9 @@ using Seen = SeenAs<V>;
 template <class C, class W>
 HWY_INLINE SeenAs<W> see(const C& c, W X0, W X1, W X2) {
   SeenAs<W> s;
-  s.P0 = fma(c[0], X0, fma(c[1], X1, fma(c[2], X2, c[9])));
-  s.P1 = fma(c[3], X0, fma(c[4], X1, fma(c[5], X2, c[10])));
-  s.P2 = fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[11])));
+  s.P0 = fma(c[0], X0, fma(c[1], X1, fma(c[2], X2, c[camera_record::kTranslation])));
+  s.P1 = fma(c[3], X0, fma(c[4], X1, fma(c[5], X2, c[camera_record::kTranslation + 1])));
+  s.P2 = fma(c[6], X0, fma(c[7], X1, fma(c[8], X2, c[camera_record::kTranslation + 2])));
   s.iz = hn::Div(fill<W>(-1.0), s.P2);
   s.x = hn::Mul(s.P0, s.iz);
   s.y = hn::Mul(s.P1, s.iz);
@@ -40,22 +40,22 @@ HWY_INLINE SeenAs<W> see(const C& c, W X0, W X1, W X2) {
 /// d = 1 + k1 n + k2 n^2.
 template <class C, class W>
 HWY_INLINE W distortion(const C& c, W n) {
-  return fma(n, fma(n, c[14], c[13]), fill<W>(1.0));
+  return fma(n, fma(n, c[camera_record::kK2], c[camera_record::kK1]), fill<W>(1.0));
 }
 
 /// dd = f (2 k1 + 4 k2 n).
 template <class C, class W>
 HWY_INLINE W distortion_slope(const C& c, W n) {
-  const W k1 = hn::Add(c[13], c[13]);
-  const W k2 = hn::Mul(fill<W>(4.0), c[14]);
-  return hn::Mul(c[12], fma(k2, n, k1));
+  const W k1 = hn::Add(c[camera_record::kK1], c[camera_record::kK1]);
+  const W k2 = hn::Mul(fill<W>(4.0), c[camera_record::kK2]);
+  return hn::Mul(c[camera_record::kFocal], fma(k2, n, k1));
 }
 
 /// scale multiplies residual and Jacobian (0 for masked lanes); nullptr: all ones.
 HWY_INLINE LaneJacobian linearize_lanes(const V* c, V X0, V X1, V X2, V zx, V zy, const V* scale) {
   const Seen s = see(c, X0, X1, X2);
   V d = distortion(c, s.n);
-  V f = c[12];
+  V f = c[camera_record::kFocal];
   V fd = hn::Mul(f, d);
   const V dd = distortion_slope(c, s.n);
   const V ddx = hn::Mul(dd, s.x);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "lists/block_layout.h"
 #include "rows/row_layout.h"
 
 namespace sheaf {
@@ -79,7 +80,7 @@ struct PatchCost {
 PatchCost list_pixels(const PatchLane& patch, std::vector<PixelRow>& rows) {
   const PhotometricInput& in = patch.in;
   const PatchGrid& grid = *in.grid;
-  const double alpha = patch.view[12], beta = patch.view[13];
+  const double alpha = patch.view[view_record::kAlpha], beta = patch.view[view_record::kBeta];
   PatchCost cost;
   rows.clear();
   for (std::uint32_t cell : grid.place) {
@@ -112,6 +113,7 @@ PatchCost list_pixels(const PatchLane& patch, std::vector<PixelRow>& rows) {
 /// `to`: the lane's first field in the batch of the first pair.
 void write_rows(const std::vector<PixelRow>& R, const double* view, double s, std::size_t lanes,
                 double* to) {
+  const double* t = view + pose_record::kTranslation;
   for (std::size_t i = 0; i < std::min<std::size_t>(2 * kExactPairs, R.size()); ++i) {
     double* pair = to + kRowBatch * (i / 2);
     const int row = static_cast<int>(i % 2);
@@ -120,7 +122,7 @@ void write_rows(const std::vector<PixelRow>& R, const double* view, double s, st
     };
     put(row_field::residual(row), R[i][kResidual]);
     for (int k = 0; k < 8; ++k) put(row_field::camera(row, k), (k < 3 ? s : 1.0) * R[i][k]);
-    put(row_field::point(row, 0), R[i][0] * view[9] + R[i][1] * view[10] + R[i][2] * view[11]);
+    put(row_field::point(row, 0), R[i][0] * t[0] + R[i][1] * t[1] + R[i][2] * t[2]);
   }
 }
 
@@ -140,13 +142,14 @@ PatchCost collapse_lane(const PhotometricInput& in, std::size_t g, std::uint64_t
                         int lanes, PhotometricOutput& out, std::vector<PixelRow>& rows) {
   const std::uint32_t block = in.batches->image[8 * b + static_cast<std::size_t>(lane)];
   const double* view = in.views + kViewRecord * block;
-  const double *d = in.rays + 24 * g + lane, s = in.points[24 * g + static_cast<std::size_t>(lane)];
+  const double* d = in.rays + kPointGroup * g + lane;
+  const double s = in.points[kPointGroup * g + static_cast<std::size_t>(lane)];
   const std::size_t point = in.batches->lane_point[8 * g + static_cast<std::size_t>(lane)];
   PatchLane patch{in, view, in.planes[in.block_image[block]],
                   {}, {},   in.references + in.grid->cells() * point};
   for (int i = 0; i < 3; ++i)
-    patch.P[i] =
-        view[3 * i] * d[0] + view[3 * i + 1] * d[8] + view[3 * i + 2] * d[16] + s * view[9 + i];
+    patch.P[i] = view[3 * i] * d[0] + view[3 * i + 1] * d[8] + view[3 * i + 2] * d[16] +
+                 s * view[pose_record::kTranslation + i];
   const auto u = patch.project({patch.P[0], patch.P[1], patch.P[2]});
   patch.middle[0] = u[0], patch.middle[1] = u[1];
   double* seen = out.seen + 16 * b + lane;

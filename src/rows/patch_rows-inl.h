@@ -9,6 +9,7 @@
 #define SHEAF_RESIDUAL_PATCH_ROWS_INL_H_
 #endif
 
+#include "lists/block_layout.h"
 #include "rows/photometric.h"
 #include "rows/rows-inl.h"
 
@@ -23,8 +24,8 @@ struct LanePoints {
 
 template <bool kRays>
 HWY_INLINE LanePoints load_points(const PhotometricInput& in, std::size_t group, int lane) {
-  const double* X = in.points + 24 * group + lane;
-  const double* from = kRays ? in.rays + 24 * group + lane : X;
+  const double* X = in.points + kPointGroup * group + lane;
+  const double* from = kRays ? in.rays + kPointGroup * group + lane : X;
   return {{load(from), load(from + 8), load(from + 16)}, kRays ? load(X) : set(1.0)};
 }
 
@@ -36,8 +37,9 @@ struct Place {
 HWY_INLINE Place place_points(const Pinhole& camera, const V* c, const V* d, V s) {
   Place at;
   for (int r = 0; r < 3; ++r)
-    at.P[r] =
-        fma(c[3 * r], d[0], fma(c[3 * r + 1], d[1], fma(c[3 * r + 2], d[2], hn::Mul(s, c[9 + r]))));
+    at.P[r] = fma(c[3 * r], d[0],
+                  fma(c[3 * r + 1], d[1],
+                      fma(c[3 * r + 2], d[2], hn::Mul(s, c[pose_record::kTranslation + r]))));
   at.iz = hn::Div(set(1.0), at.P[2]);
   at.x = fma(set(camera.fx), hn::Mul(at.P[0], at.iz), set(camera.cx));
   at.y = fma(set(camera.fy), hn::Mul(at.P[1], at.iz), set(camera.cy));
@@ -99,7 +101,8 @@ HWY_INLINE LaneJacobian rows_of(const Whitened& w, const Pinhole& camera, const 
     to[5] = fms(a1, at.P[0], hn::Mul(a0, at.P[1]));
     to[6] = w.alpha[r], to[7] = w.beta[r], to[8] = zero();
     if constexpr (kRays) {
-      j.point[r][0] = fma(a0, c[9], fma(a1, c[10], hn::Mul(a2, c[11])));
+      const V* t = c + pose_record::kTranslation;
+      j.point[r][0] = fma(a0, t[0], fma(a1, t[1], hn::Mul(a2, t[2])));
       j.point[r][1] = j.point[r][2] = zero();
     } else {
       for (int i = 0; i < 3; ++i)
@@ -113,8 +116,9 @@ HWY_INLINE LaneJacobian rows_of(const Whitened& w, const Pinhole& camera, const 
 template <bool kBrightness, bool kRays>
 HWY_INLINE LaneJacobian rows_again(const PhotometricInput& in, const double* factors,
                                    std::uint64_t b, int lane, const LanePoints& X) {
-  V c[16];
-  load_cameras<2>(in.views, &in.batches->image[8 * b + lane], in.batches->uniform[b], c);
+  V c[8 * view_record::kOctets];
+  load_state<view_record::kOctets, kViewRecord>(in.views, &in.batches->image[8 * b + lane],
+                                                in.batches->uniform[b], c);
   const Place at = place_points(in.camera, c, X.d, X.s);
   const Whitened w = restore_factors<kBrightness>(factors + patch_factors(kBrightness) * b + lane);
   LaneJacobian j = rows_of<kRays>(w, in.camera, c, at, X.s);

@@ -10,7 +10,7 @@
 #include "image/grey.h"
 #include "image/interpolation.h"
 #include "lists/batches.h"
-#include "rows/row_store.h"
+#include "rows/row_layout.h"
 #include "sheaf/photometric.h"
 
 namespace sheaf {
@@ -101,6 +101,10 @@ bool patch_residuals(const PatchScene& scene, const PatchState& state, const Sig
 /// the inverse depth and (R, t) leads from the host to the target. The patch's grey level g looks
 /// like alpha g + beta in the image.
 constexpr std::size_t kViewRecord = 24;
+namespace view_record {
+constexpr int kAlpha = 12, kBeta = 13;
+constexpr int kOctets = 2;  ///< eights to read
+}  // namespace view_record
 
 /// Patches arranged in batches: what Batches calls an image is a camera block here.
 struct PhotometricInput {

@@ -25,7 +25,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-static_assert(kRowBatch == kJacobianFields * kLanes * kParts);
+static_assert(kRowBatch == row_field::kCount * kLanes * kParts);
 
 template <bool kBrightness>
 HWY_INLINE Whitened whiten(const V* sums, double* brightness) {
@@ -107,12 +107,13 @@ HWY_INLINE PatchLanes lanes_at(const Walk& walk, V alpha, V beta) {
 template <bool kRays>
 HWY_INLINE void aim(const PhotometricInput& in, const Walk& walk, const PhotometricOutput& out,
                     Aim& to) {
-  V c[16];
-  load_cameras<2>(in.views, &walk.batches.image[8 * walk.batch + walk.lane()],
-                  walk.batches.uniform[walk.batch], c);
+  V c[8 * view_record::kOctets];
+  load_state<view_record::kOctets, kViewRecord>(in.views,
+                                                &walk.batches.image[8 * walk.batch + walk.lane()],
+                                                walk.batches.uniform[walk.batch], c);
   const LanePoints X = load_points<kRays>(in, walk.group, walk.lane());
   to.at = place_points(in.camera, c, X.d, X.s);
-  to.alpha = c[12], to.beta = c[13];
+  to.alpha = c[view_record::kAlpha], to.beta = c[view_record::kBeta];
   double* seen = out.seen + 16 * walk.batch + walk.lane();
   if (kRays && in.warped)
     store(to.at.x, seen), store(to.at.y, seen + 8);
@@ -160,12 +161,13 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Walk& walk, Aim&
   if (out.factors != nullptr)
     save_factors<kBrightness>(w, out.factors + patch_factors(kBrightness) * b + lane);
   if (out.rows == nullptr) return;
-  V c[16];
-  load_cameras<2>(in.views, &walk.batches.image[8 * b + lane], walk.batches.uniform[b], c);
+  V c[8 * view_record::kOctets];
+  load_state<view_record::kOctets, kViewRecord>(in.views, &walk.batches.image[8 * b + lane],
+                                                walk.batches.uniform[b], c);
   const LanePoints X = load_points<kRays>(in, walk.group, lane);
   LaneJacobian j = rows_of<kRays>(w, in.camera, c, aim.at, X.s);
   if (!all_fit) zero_rows(fits, j);
-  save(j, out.rows + kRowBatch * b + kJacobianFields * kLanes * part);
+  save(j, out.rows + kRowBatch * b + row_field::kCount * kLanes * part);
 }
 
 /// Where the next patches' pixels are is known, and they are asked for, before those of the ones at

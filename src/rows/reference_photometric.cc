@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "lists/block_layout.h"
 #include "rows/reference_patch.h"
 #include "rows/row_layout.h"
 
@@ -16,7 +17,8 @@ Vector3<double> PatchLane::middle() const {
   const double *V = view(), *d = (in.rays == nullptr ? in.points : in.rays) + 24 * group + lane;
   Vector3<double> P;
   for (std::size_t i = 0; i < 3; ++i)
-    P[i] = V[3 * i] * d[0] + V[3 * i + 1] * d[8] + V[3 * i + 2] * d[16] + scale() * V[9 + i];
+    P[i] = V[3 * i] * d[0] + V[3 * i + 1] * d[8] + V[3 * i + 2] * d[16] +
+           scale() * V[pose_record::kTranslation + i];
   return P;
 }
 
@@ -80,7 +82,7 @@ PointRow patch_rows(const PatchLane& patch, const PatchFactor& factor) {
       rows.camera[e][i] = s * A[i];
       rows.camera[e][3 + i] = turned[i];
       if (patch.in.rays != nullptr)
-        rows.point[e][0] += A[i] * view[9 + i];
+        rows.point[e][0] += A[i] * view[pose_record::kTranslation + i];
       else
         rows.point[e][i] = A[0] * view[i] + A[1] * view[3 + i] + A[2] * view[6 + i];
     }

@@ -10,46 +10,56 @@
 #define SHEAF_RESIDUAL_ROWS_INL_H_
 #endif
 
+#include "lists/block_layout.h"
 #include "platform/simd-inl.h"
+#include "rows/row_layout.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// The first 8 Octets fields of the 24-double camera records of kLanes images; `image` points at
-/// the part's first lane, `uniform` is the image of all lanes or negative.
+/// The first 8 Octets fields of the records of kLanes images or lenses; `index` points at the
+/// part's first lane, `uniform` is the index of all lanes or negative.
+template <int Octets, std::size_t kRecord>
+HWY_INLINE void load_state(const double* records, const std::uint32_t* index, std::int32_t uniform,
+                           V* c) {
+  if (uniform >= 0) {
+    const double* record = records + kRecord * static_cast<std::size_t>(uniform);
+    for (int o = 0; o < Octets; ++o) broadcast_record(record + 8 * o, c + 8 * o);
+  } else {
+    for (int o = 0; o < Octets; ++o) load_records(records + 8 * o, kRecord, index, c + 8 * o);
+  }
+}
 template <int Octets>
 HWY_INLINE void load_cameras(const double* cameras, const std::uint32_t* image,
                              std::int32_t uniform, V* c) {
-  if (uniform >= 0) {
-    const double* record = cameras + 24 * static_cast<std::size_t>(uniform);
-    for (int o = 0; o < Octets; ++o) broadcast_record(record + 8 * o, c + 8 * o);
-  } else {
-    for (int o = 0; o < Octets; ++o) load_records(cameras + 8 * o, 24, image, c + 8 * o);
-  }
+  load_state<Octets, kCameraRecord>(cameras, image, uniform, c);
 }
 
 /// Residual (2), camera Jacobian (2 x 9) and point Jacobian (2 x 3) of one observation per lane.
 struct LaneJacobian {
   V r[2], camera[2][9], point[2][3];
 };
-constexpr int kJacobianFields = 26;
 
-/// kJacobianFields x kLanes doubles.
+/// Field by field (rows/row_layout.h), a part's lanes of each.
+HWY_INLINE V load_field(const double* from, int field) { return load(from + field * kLanes); }
+HWY_INLINE void store_field(V x, double* to, int field) { store(x, to + field * kLanes); }
+
+/// row_field::kCount x kLanes doubles.
 HWY_INLINE void save(const LaneJacobian& j, double* to) {
-  store(j.r[0], to), store(j.r[1], to + kLanes);
+  for (int r = 0; r < 2; ++r) store_field(j.r[r], to, row_field::residual(r));
   for (int r = 0; r < 2; ++r) {
-    for (int i = 0; i < 9; ++i) store(j.camera[r][i], to + (2 + 9 * r + i) * kLanes);
-    for (int i = 0; i < 3; ++i) store(j.point[r][i], to + (20 + 3 * r + i) * kLanes);
+    for (int i = 0; i < 9; ++i) store_field(j.camera[r][i], to, row_field::camera(r, i));
+    for (int i = 0; i < 3; ++i) store_field(j.point[r][i], to, row_field::point(r, i));
   }
 }
 
 HWY_INLINE LaneJacobian restore(const double* from) {
   LaneJacobian j;
-  j.r[0] = load(from), j.r[1] = load(from + kLanes);
   for (int r = 0; r < 2; ++r) {
-    for (int i = 0; i < 9; ++i) j.camera[r][i] = load(from + (2 + 9 * r + i) * kLanes);
-    for (int i = 0; i < 3; ++i) j.point[r][i] = load(from + (20 + 3 * r + i) * kLanes);
+    j.r[r] = load_field(from, row_field::residual(r));
+    for (int i = 0; i < 9; ++i) j.camera[r][i] = load_field(from, row_field::camera(r, i));
+    for (int i = 0; i < 3; ++i) j.point[r][i] = load_field(from, row_field::point(r, i));
   }
   return j;
 }

@@ -57,8 +57,8 @@ void FloatBalOperator::prepare(const double* squares) {
   for (int k = 0; k < 3; ++k) origin_[k] = sum[k] / static_cast<double>(images_);
   const auto moved = [&](const double* R, double* t) {
     for (int k = 0; k < 3; ++k)
-      t[k] =
-          R[9 + k] + R[3 * k] * origin_[0] + R[3 * k + 1] * origin_[1] + R[3 * k + 2] * origin_[2];
+      t[k] = R[camera_record::kTranslation + k] + R[3 * k] * origin_[0] +
+             R[3 * k + 1] * origin_[1] + R[3 * k + 2] * origin_[2];
   };
   double length = 0;
   for (std::size_t i = 0; i < images_; ++i) {
@@ -74,8 +74,8 @@ void FloatBalOperator::prepare(const double* squares) {
     moved(R, t);
     for (int k = 0; k < 9; ++k) to[k] = static_cast<float>(R[k]);
     for (int k = 0; k < 3; ++k) {
-      to[9 + k] = static_cast<float>(scale_ * t[k]);
-      to[12 + k] = static_cast<float>(R[12 + k]);
+      to[camera_record::kTranslation + k] = static_cast<float>(scale_ * t[k]);
+      to[camera_record::kFocal + k] = static_cast<float>(R[camera_record::kFocal + k]);
     }
   });
 }

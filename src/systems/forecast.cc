@@ -59,13 +59,13 @@ void add_state(const WorkCounts& c, Footprint& sum) {
 void add_scratch(const WorkCounts& c, SolverKind kind, int threads, Footprint& sum) {
   const std::uint64_t track = c.longest_track, batches = std::max(Chunks::kBatchesPerChunk, track);
   const auto each = static_cast<std::uint64_t>(threads);
-  sum.add(8 * std::min(batches, c.batches) * (kTRecord + kCRecord) + 26 * 8 * track, 8, each);
-  if (kind == SolverKind::implicit_cg) sum.add(31 * 8 * track, 8, each);
-  if (c.clusters > 0) sum.add(25 * std::min(c.clusters, track), 8, each);
+  sum.add(8 * std::min(batches, c.batches) * (kTRecord + kCRecord) + kRowBatch * track, 8, each);
+  if (kind == SolverKind::implicit_cg) sum.add(kProductScratch * track, 8, each);
+  if (c.clusters > 0) sum.add(kCoarseScratch * std::min(c.clusters, track), 8, each);
 }
 
 void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, Footprint& sum) {
-  constexpr std::uint64_t kVector = 16 * 8, kBlock = 72;
+  constexpr std::uint64_t kVector = 8 * kBlockVector, kBlock = 72;
   sum.add(c.images, 81 * 8);
   sum.add(c.images, kBlock + 4);
   sum.add(c.columns, 8, 4);

@@ -11,14 +11,14 @@
 namespace sheaf {
 namespace {
 
-constexpr std::size_t kRecord = 16;  // the first fields of a camera record
+constexpr std::size_t kRecord = 8 * camera_record::kStateOctets;  // first fields of a camera's
 
 /// Observations of a piece whose point has P.z > 0; and, where `before` is given, had not there.
 std::uint64_t count_behind_in(const ImageBatches& batches, const ImageBatches::Piece& piece,
                               const double* now, const double* before) {
   std::uint64_t count = 0;
   const auto depth = [](const double* c, const double* z) {
-    return c[6] * z[0] + c[7] * z[8] + c[8] * z[16] + c[11];
+    return c[6] * z[0] + c[7] * z[8] + c[8] * z[16] + c[camera_record::kTranslation + 2];
   };
   for (std::uint32_t b = 0; b < piece.batches; ++b) {
     const double* z = batches.batches(piece) + ImageBatches::kBatchDoubles * b;
@@ -33,10 +33,9 @@ std::uint64_t count_behind_in(const ImageBatches& batches, const ImageBatches::P
 void add_to_block(const double* sums, double* block) {
   for (int i = 0; i < 9; ++i) {
     for (int k = 0; k <= i; ++k) {
-      double& to = i < 8 ? block[8 * i + k] : block[k < 8 ? 64 + k : 88];
-      to += sums[image_sums::entry(i, k)];
+      block[diagonal_layout::at(i, k)] += sums[image_sums::entry(i, k)];
     }
-    block[i < 8 ? 72 + i : 89] += sums[image_sums::kGradient + i];
+    block[diagonal_layout::right_side(i)] += sums[image_sums::kGradient + i];
   }
 }
 
@@ -85,9 +84,10 @@ void ImageSystem::write_records(State& state) const {
     const RigidMotion<double>& pose = state.cameras.poses[i];
     const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
     std::copy(R.begin(), R.end(), record);
-    std::copy(pose.translation.begin(), pose.translation.end(), record + 9);
-    std::copy_n(state.cameras.sets[image_camera_[i]].begin(), 3, record + 12);
-    record[15] = 0;
+    std::copy(pose.translation.begin(), pose.translation.end(),
+              record + camera_record::kTranslation);
+    std::copy_n(state.cameras.sets[image_camera_[i]].begin(), 3, record + camera_record::kFocal);
+    record[kRecord - 1] = 0;
   }
 }
 

@@ -49,8 +49,8 @@ LensRows::LensRows(const Arrangement& arrangement, const Kernels& kernels, Threa
       layout_(arrangement.batches, arrangement.tracks, chunks_, arrangement.lists.tiles),
       columns_(CameraColumns::of_lenses(arrangement.columns, arrangement.tracks)) {
   for (LensCameras* records : {&held_, &tried_}) {
-    records->images.allocate(kLensStateRecord * arrangement.tracks.image_lens.size());
-    records->lenses.allocate(kLensStateRecord * arrangement.tracks.lenses.size());
+    records->images.allocate(kImageRecord * arrangement.tracks.image_lens.size());
+    records->lenses.allocate(kLensRecord * arrangement.tracks.lenses.size());
   }
 }
 
@@ -61,17 +61,17 @@ void LensRows::attach(const SteppedState& state) {
 
 void LensRows::write_records(const CameraState& cameras, LensCameras& records) const {
   for (std::size_t i = 0; i < cameras.poses.size(); ++i) {
-    double* record = &records.images[kLensStateRecord * i];
+    double* record = &records.images[kImageRecord * i];
     const Matrix3<double> R = matrix_from_quaternion(cameras.poses[i].rotation);
     const auto& t = cameras.poses[i].translation;
     std::copy(R.begin(), R.end(), record);
-    std::copy(t.begin(), t.end(), record + 9);
-    std::fill(record + lens_record::kPoseStep, record + kLensStateRecord, 0.0);
+    std::copy(t.begin(), t.end(), record + pose_record::kTranslation);
+    std::fill(record + image_record::kStep, record + kImageRecord, 0.0);
   }
   for (std::size_t c = 0; c < cameras.sets.size(); ++c) {
-    double* record = &records.lenses[kLensStateRecord * c];
+    double* record = &records.lenses[kLensRecord * c];
     std::copy(cameras.sets[c].begin(), cameras.sets[c].end(), record);
-    std::fill(record + lens_record::kParameterStep, record + kLensStateRecord, 0.0);
+    std::fill(record + lens_record::kStep, record + kLensRecord, 0.0);
   }
 }
 
@@ -98,11 +98,11 @@ void LensRows::step(const Buffer<double>& columns) {
   for (std::size_t i = 0; i < images; ++i) {
     const std::int32_t* c = arranged_.columns.image(i);
     if (c[0] < 0) continue;
-    double* to = &held_.images[kLensStateRecord * i + lens_record::kPoseStep];
+    double* to = &held_.images[kImageRecord * i + image_record::kStep];
     for (std::size_t k = 0; k < 6; ++k) to[k] = columns[static_cast<std::size_t>(c[k])];
   }
   for (const CameraColumns::Parameter& p : columns_.parameters())
-    held_.lenses[kLensStateRecord * p.set + lens_record::kParameterStep + p.index] =
+    held_.lenses[kLensRecord * p.set + lens_record::kStep + p.index] =
         columns[static_cast<std::size_t>(p.column)];
   write_records(state_->tried.cameras, tried_);
 }
@@ -128,12 +128,13 @@ Costs LensRows::tried_costs(const PointTrial& in, const Costs& summed, Trial& ou
 bool LensRows::sees(const LensCameras& records, const PointState& state, std::uint64_t batch,
                     std::uint32_t lane, std::size_t group) const {
   const std::size_t at = 8 * batch + lane;
-  const double* pose = &records.images[kLensStateRecord * arranged_.batches.image[at]];
+  const double* pose = &records.images[kImageRecord * arranged_.batches.image[at]];
   const double* X = &state.points[kPointGroup * group + lane];
   const std::uint32_t lens = arranged_.tracks.lens[at];
   double P[3];
   for (int i = 0; i < 3; ++i)
-    P[i] = pose[3 * i] * X[0] + pose[3 * i + 1] * X[8] + pose[3 * i + 2] * X[16] + pose[9 + i];
+    P[i] = pose[3 * i] * X[0] + pose[3 * i + 1] * X[8] + pose[3 * i + 2] * X[16] +
+           pose[pose_record::kTranslation + i];
   return with_lens(arranged_.tracks.lenses[lens].model,
                    [&](auto model) { return model.sees(state.cameras.sets[lens].data(), P); });
 }

@@ -37,7 +37,7 @@ class LensRows : public PointRows {
  private:
   class Operator;
   struct LensCameras {
-    Buffer<double> images, lenses;  ///< kCameraRecord, kLensStateRecord each
+    Buffer<double> images, lenses;  ///< kImageRecord, kLensRecord each
   };
   void write_records(const CameraState& cameras, LensCameras& records) const;
   LensState view(const LensCameras& records, const PointState& state) const {

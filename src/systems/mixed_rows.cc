@@ -6,7 +6,6 @@
 
 #include "eliminate/kernels.h"
 #include "rows/row_layout.h"
-#include "rows/row_store.h"
 
 namespace sheaf {
 namespace {

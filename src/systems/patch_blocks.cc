@@ -114,10 +114,10 @@ void PatchBlocks::write_views(const Poses& poses, const std::vector<Brightness>&
     double* view = views + kViewRecord * b;
     const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
     std::copy(R.begin(), R.end(), view);
-    std::copy(pose.translation.begin(), pose.translation.end(), view + 9);
-    view[12] = look.a;
-    view[13] = look.b;
-    std::fill(view + 14, view + kViewRecord, 0.0);
+    std::copy(pose.translation.begin(), pose.translation.end(), view + pose_record::kTranslation);
+    view[view_record::kAlpha] = look.a;
+    view[view_record::kBeta] = look.b;
+    std::fill(view + view_record::kBeta + 1, view + kViewRecord, 0.0);
   }
 }
 
@@ -169,10 +169,11 @@ void PatchBlocks::fold(const Poses& poses, const std::vector<Brightness>& bright
     take(targets_[b], hosts_[b], sandwich(Y, D, Z), -1);
     for (int k = 0; k < 8; ++k)
       for (int i = 0; i < 8; ++i) {
-        block(targets_[b])[72 + k] += Y[8 * i + k] * from[72 + i];
-        block(hosts_[b])[72 + k] += Z[8 * i + k] * from[72 + i];
-        block(targets_[b])[80 + k] += Y[8 * i + k] * Y[8 * i + k] * from[80 + i];
-        block(hosts_[b])[80 + k] += Z[8 * i + k] * Z[8 * i + k] * from[80 + i];
+        using namespace diagonal_layout;
+        block(targets_[b])[right_side(k)] += Y[8 * i + k] * from[right_side(i)];
+        block(hosts_[b])[right_side(k)] += Z[8 * i + k] * from[right_side(i)];
+        block(targets_[b])[squares(k)] += Y[8 * i + k] * Y[8 * i + k] * from[squares(i)];
+        block(hosts_[b])[squares(k)] += Z[8 * i + k] * Z[8 * i + k] * from[squares(i)];
       }
   }
   for (std::size_t t = 0; t < fold.block_tiles->size(); ++t) {
@@ -182,13 +183,15 @@ void PatchBlocks::fold(const Poses& poses, const std::vector<Brightness>& bright
     take(targets_[p], hosts_[q], sandwich(maps[p].target, P, maps[q].host), 1);
     take(hosts_[p], targets_[q], sandwich(maps[p].host, P, maps[q].target), 1);
     take(hosts_[p], hosts_[q], sandwich(maps[p].host, P, maps[q].host), 1);
-    if (p == q) add_repeated_squares(maps[p], P, block(targets_[p]) + 80, block(hosts_[p]) + 80);
+    if (p == q)
+      add_repeated_squares(maps[p], P, block(targets_[p]) + diagonal_layout::kSquares,
+                           block(hosts_[p]) + diagonal_layout::kSquares);
   }
 }
 
 void PatchBlocks::step(const Poses& poses, const std::vector<Brightness>& brightness,
                        const double* image_steps, double* block_steps) const {
-  constexpr std::size_t kStep = 16;
+  constexpr std::size_t kStep = kBlockVector;
   for (std::size_t b = 0; b < targets_.size(); ++b) {
     double* to = block_steps + kStep * b;
     std::fill(to, to + kStep, 0.0);

@@ -54,7 +54,7 @@ class PatchBlocks {
   void fold(const Poses& poses, const std::vector<Brightness>& brightness, std::size_t images,
             const Fold& fold) const;
 
-  /// The blocks' steps from the images': kStepRecord doubles each.
+  /// The blocks' steps from the images': kBlockVector doubles each.
   void step(const Poses& poses, const std::vector<Brightness>& brightness,
             const double* image_steps, double* block_steps) const;
 

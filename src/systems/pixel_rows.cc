@@ -96,8 +96,8 @@ PixelRows::PixelRows(const PatchScene& scene, const std::vector<Sight>& sights, 
   const std::size_t images = scene.num_images();
   allocate(held_);
   allocate(tried_);
-  image_steps_.allocate(kStepRecord * images);
-  steps_.allocate(kStepRecord * blocks_.count());
+  image_steps_.allocate(kBlockVector * images);
+  steps_.allocate(kBlockVector * blocks_.count());
   if (blocks_.are_pairs()) {
     image_tiles_.allocate(kTileDoubles * image_chunks_.tiles.size());
     image_diagonal_.allocate(kDiagonalDoubles * images);
@@ -253,12 +253,12 @@ void PixelRows::add_brightness(const Chunk& chunk, double* diagonal) const {
       for (std::uint32_t l = 0; l < group.lanes; ++l) {
         const double* from = &held_.brightness_sums[kBrightnessBatch * b + l];
         double* block = diagonal + kDiagonalDoubles * batches_.image[8 * b + l];
-        block[8 * 6 + 6] += from[0];
-        block[8 * 6 + 7] += from[8];
-        block[8 * 7 + 6] += from[8];
-        block[8 * 7 + 7] += from[16];
-        block[72 + 6] += from[24];
-        block[72 + 7] += from[32];
+        block[diagonal_layout::at(6, 6)] += from[0];
+        block[diagonal_layout::at(6, 7)] += from[8];
+        block[diagonal_layout::at(7, 6)] += from[8];
+        block[diagonal_layout::at(7, 7)] += from[16];
+        block[diagonal_layout::right_side(6)] += from[24];
+        block[diagonal_layout::right_side(7)] += from[32];
       }
   }
 }
@@ -269,10 +269,10 @@ void PixelRows::add_priors(double* diagonal) const {
   const std::vector<Brightness> held = brightness_of(state_->held.cameras);
   for (std::size_t i = 0; i < held.size(); ++i) {
     double* block = diagonal + kDiagonalDoubles * i;
-    block[8 * 6 + 6] += wa;
-    block[8 * 7 + 7] += wb;
-    block[72 + 6] += wa * (held[i].a - 1);
-    block[72 + 7] += wb * held[i].b;
+    block[diagonal_layout::at(6, 6)] += wa;
+    block[diagonal_layout::at(7, 7)] += wb;
+    block[diagonal_layout::right_side(6)] += wa * (held[i].a - 1);
+    block[diagonal_layout::right_side(7)] += wb * held[i].b;
   }
 }
 
@@ -327,8 +327,8 @@ ReducedSums PixelRows::finish(double* tiles, double* diagonal) {
 void PixelRows::step(const Buffer<double>& columns) {
   for (std::size_t i = 0; i < scene_.num_images(); ++i) {
     const std::int32_t* c = columns_.image(i);
-    double* d = &image_steps_[kStepRecord * i];
-    std::fill(d, d + kStepRecord, 0.0);
+    double* d = &image_steps_[kBlockVector * i];
+    std::fill(d, d + kBlockVector, 0.0);
     for (int k = 0; k < 8; ++k)
       if (c[k] >= 0) d[k] = columns[static_cast<std::size_t>(c[k])];
   }

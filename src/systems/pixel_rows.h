@@ -120,7 +120,7 @@ class PixelRows : public PointRows {
   Buffer<double> leaving_, leaving_costs_;       ///< empty where leaving is free
   Buffer<double> image_tiles_, image_diagonal_;  ///< folded; empty where blocks are images
   std::vector<std::int64_t> tile_of_;            ///< of two images
-  Buffer<double> image_steps_, steps_;           ///< kStepRecord per image, per block
+  Buffer<double> image_steps_, steps_;           ///< kBlockVector per image, per block
   Totals totals_, tried_totals_;
   ScaledLoss loss_;
   bool collapsed_ = false;  ///< held_'s rows are those of its state with loss_

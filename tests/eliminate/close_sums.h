@@ -17,7 +17,7 @@ namespace sheaf::test {
 /// The size of a column of a diagonal block: by its squares with and without points.
 inline double column_size(const Buffer<double>& diagonal, std::size_t block, int column) {
   const double* d = &diagonal[kDiagonalDoubles * block];
-  return std::sqrt(column < 8 ? d[9 * column] + d[80 + column] : d[88] + d[90]);
+  return std::sqrt(diagonal_entry(d, column, column) + d[diagonal_layout::squares(column)]);
 }
 
 /// Diagonal blocks entry by entry, each against the sizes of its row and its column; `residual` is

@@ -38,8 +38,8 @@ class DoglegKernelsTest : public testing::Test {
       const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
       std::copy(R.begin(), R.end(), c);
       for (int k = 0; k < 3; ++k) {
-        c[9 + k] = problem.poses[i].translation[k];
-        c[12 + k] = problem.cameras[i].parameters[k];
+        c[camera_record::kTranslation + k] = problem.poses[i].translation[k];
+        c[camera_record::kFocal + k] = problem.cameras[i].parameters[k];
       }
       for (int k = 0; k < 9; ++k) c[15 + k] = 1e-3 * std::sin(double(9 * i + k));
     }

@@ -53,8 +53,9 @@ class KernelsTest : public ::testing::Test {
       for (std::size_t k = 0; k < kCameraRecord; ++k) to[k] = static_cast<float>(c[k]);
       for (int k = 0; k < 3; ++k) {
         const double* R = c + 3 * k;
-        const double t = c[9 + k] + R[0] * origin[0] + R[1] * origin[1] + R[2] * origin[2];
-        to[9 + k] = static_cast<float>(scale * t);
+        const double t = c[camera_record::kTranslation + k] + R[0] * origin[0] + R[1] * origin[1] +
+                         R[2] * origin[2];
+        to[camera_record::kTranslation + k] = static_cast<float>(scale * t);
         to[18 + k] = static_cast<float>(scale * c[18 + k]);
       }
     }
@@ -69,14 +70,14 @@ class KernelsTest : public ::testing::Test {
       const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
       std::copy(R.begin(), R.end(), c);
       for (int k = 0; k < 3; ++k) {
-        c[9 + k] = problem.poses[i].translation[k];
-        c[12 + k] = problem.cameras[i].parameters[k];
+        c[camera_record::kTranslation + k] = problem.poses[i].translation[k];
+        c[camera_record::kFocal + k] = problem.cameras[i].parameters[k];
       }
       for (int k = 0; k < 9; ++k) c[15 + k] = 1e-3 * std::sin(double(9 * i + k));
       double* t = &trial_cameras_[kCameraRecord * i];
       std::copy(c, c + kCameraRecord, t);
       t[9] += 0.01;
-      t[12] *= 1.001;
+      t[camera_record::kFocal] *= 1.001;
     }
     points_.allocate(kPointGroup * batches_.groups.size());
     for (std::size_t g = 0; g < batches_.groups.size(); ++g)

@@ -65,19 +65,20 @@ class Linearized {
 
  private:
   void read_state(const Problem& problem, const Batches& batches) {
-    images_.allocate(kLensStateRecord * problem.num_images());
-    lenses_.allocate(kLensStateRecord * problem.cameras.size());
+    images_.allocate(kImageRecord * problem.num_images());
+    lenses_.allocate(kLensRecord * problem.cameras.size());
     points_.allocate(kPointGroup * batches.groups.size());
     images_.fill(0), lenses_.fill(0), points_.fill(0);
     for (std::size_t i = 0; i < problem.num_images(); ++i) {
       const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
-      double* to = &images_[kLensStateRecord * i];
+      double* to = &images_[kImageRecord * i];
       std::copy(R.begin(), R.end(), to);
-      std::copy(problem.poses[i].translation.begin(), problem.poses[i].translation.end(), to + 9);
+      std::copy(problem.poses[i].translation.begin(), problem.poses[i].translation.end(),
+                to + pose_record::kTranslation);
     }
     for (std::size_t c = 0; c < problem.cameras.size(); ++c)
       std::copy(problem.cameras[c].parameters.begin(), problem.cameras[c].parameters.end(),
-                &lenses_[kLensStateRecord * c]);
+                &lenses_[kLensRecord * c]);
     for (std::size_t g = 0; g < batches.groups.size(); ++g)
       for (std::size_t l = 0; l < 8; ++l)
         for (std::size_t d = 0; d < 3; ++d)
@@ -123,7 +124,7 @@ TEST(LensBlocks, AreTheSameSummedAtOnceAndFromRecords) {
             // Of a column: its own unit, by the squares of its entries with and without points.
             const auto size = [&](std::size_t k) {
               const double* of = &records.blocks[b];
-              return k < 8 ? of[9 * k] + of[80 + k] : of[88] + of[90];
+              return diagonal_entry(of, k, k) + of[diagonal_layout::squares(k)];
             };
             const std::size_t row = i < 64 ? i / 8 : i < 72 ? 8 : i < 88 ? i % 8 : 8;
             const std::size_t column = i < 72 ? i % 8 : row;

@@ -90,32 +90,31 @@ class LensProblem {
 void LensProblem::write_states(const Problem& problem) {
   const Batches& batches = arranged_.batches;
   for (Buffer<double>* images : {&images_, &tried_images_})
-    images->allocate(kLensStateRecord * problem.num_images());
+    images->allocate(kImageRecord * problem.num_images());
   for (Buffer<double>* lenses : {&lenses_, &tried_lenses_})
-    lenses->allocate(kLensStateRecord * problem.cameras.size());
+    lenses->allocate(kLensRecord * problem.cameras.size());
   images_.fill(0), lenses_.fill(0);
   for (std::size_t i = 0; i < problem.num_images(); ++i) {
     const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
-    double* to = &images_[kLensStateRecord * i];
+    double* to = &images_[kImageRecord * i];
     std::copy(R.begin(), R.end(), to);
     std::copy(problem.poses[i].translation.begin(), problem.poses[i].translation.end(), to + 9);
     for (int k = 0; k < 6; ++k)
-      to[lens_record::kPoseStep + k] = 1e-3 * std::sin(static_cast<double>(6 * i) + k);
+      to[image_record::kStep + k] = 1e-3 * std::sin(static_cast<double>(6 * i) + k);
   }
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const std::array<double, kMaxCameraParameters>& k = problem.cameras[c].parameters;
-    double* to = &lenses_[kLensStateRecord * c];
+    double* to = &lenses_[kLensRecord * c];
     std::copy(k.begin(), k.end(), to);
     for (std::size_t p = 0; p < k.size(); ++p)
       if (arranged_.tracks.lenses[c].place[p] >= 0)
-        to[lens_record::kParameterStep + p] = 1e-4 * k[p] * std::cos(static_cast<double>(c + p));
+        to[lens_record::kStep + p] = 1e-4 * k[p] * std::cos(static_cast<double>(c + p));
   }
   std::copy(images_.begin(), images_.end(), tried_images_.begin());
   std::copy(lenses_.begin(), lenses_.end(), tried_lenses_.begin());
   for (std::size_t i = 0; i < problem.num_images(); ++i)
-    tried_images_[kLensStateRecord * i + 9] += 1e-3;
-  for (std::size_t c = 0; c < problem.cameras.size(); ++c)
-    tried_lenses_[kLensStateRecord * c] *= 1.0001;
+    tried_images_[kImageRecord * i + pose_record::kTranslation] += 1e-3;
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) tried_lenses_[kLensRecord * c] *= 1.0001;
   points_.allocate(kPointGroup * batches.groups.size());
   for (std::size_t g = 0; g < batches.groups.size(); ++g)
     for (std::size_t l = 0; l < 8; ++l)

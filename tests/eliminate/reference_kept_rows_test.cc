@@ -60,10 +60,10 @@ class Kept {
       : batches_(batches),
         chunks_(cut_into_chunks(batches, blocks, ChunkLists::pairs, 16)),
         blocks_(blocks),
-        steps_(kStepRecord * blocks),
+        steps_(kBlockVector * blocks),
         points_(kPointGroup * batches.groups.size()) {
     for (std::size_t i = 0; i < steps_.size(); ++i)
-      steps_[i] = i % kStepRecord < 9 ? 1e-3 * std::sin(static_cast<double>(i)) : 0;
+      steps_[i] = i % kBlockVector < 9 ? 1e-3 * std::sin(static_cast<double>(i)) : 0;
     for (std::size_t i = 0; i < points_.size(); ++i)
       points_[i] = 2 + std::cos(static_cast<double>(i));
   }

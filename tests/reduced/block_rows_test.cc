@@ -36,7 +36,7 @@ struct Row {
       for (std::size_t k = 0; k < 9; ++k) {
         for (std::size_t r = 0; r < 8; ++r)
           blocks[kBlockEntry * e + 8 * k + r] = static_cast<T>(entry(e, r, k));
-        blocks[kBlockEntry * e + 72 + k] = static_cast<T>(entry(e, 8, k));
+        blocks[kBlockEntry * e + block_entry::at(8, k)] = static_cast<T>(entry(e, 8, k));
       }
       image.push_back(image_of(e));
     }

@@ -62,8 +62,9 @@ struct Linearised {
       double* c = &cameras[kCameraRecord * i];
       const Matrix3<double> R = matrix_from_quaternion(problem.poses[i].rotation);
       std::copy(R.begin(), R.end(), c);
-      std::copy_n(problem.poses[i].translation.begin(), 3, c + 9);
-      std::copy_n(problem.cameras[problem.image_camera[i]].parameters.begin(), 3, c + 12);
+      std::copy_n(problem.poses[i].translation.begin(), 3, c + camera_record::kTranslation);
+      std::copy_n(problem.cameras[problem.image_camera[i]].parameters.begin(), 3,
+                  c + camera_record::kFocal);
     }
     points.allocate(kPointGroup * batches.groups.size());
     for (std::size_t g = 0; g < batches.groups.size(); ++g)

@@ -64,15 +64,15 @@ TEST(PatchBlocks, StepsOfPairsAreThoseOfTheirImages) {
     // exp(step) of the view: dR = [phi]_x R, dt = [phi]_x t + rho.
     for (int column = 0; column < 4; ++column) {
       const auto at = [&](const double* view, int row) {
-        return column < 3 ? view[3 * row + column] : view[9 + row];
+        return column < 3 ? view[3 * row + column] : view[pose_record::kTranslation + row];
       };
       const Vector3<double> turned =
           cross(Vector3<double>{x[3], x[4], x[5]}, Vector3<double>{at(v, 0), at(v, 1), at(v, 2)});
       for (int row = 0; row < 3; ++row)
         EXPECT_NEAR(at(w, row) - at(v, row), turned[row] + (column == 3 ? x[row] : 0), 1e-10);
     }
-    EXPECT_NEAR(w[12] - v[12], x[6], 1e-10);
-    EXPECT_NEAR(w[13] - v[13], x[7], 1e-10);
+    EXPECT_NEAR(w[view_record::kAlpha] - v[view_record::kAlpha], x[6], 1e-10);
+    EXPECT_NEAR(w[view_record::kBeta] - v[view_record::kBeta], x[7], 1e-10);
   }
 }
 
@@ -94,7 +94,7 @@ TEST(PatchBlocks, FoldingKeepsTheQuadraticForm) {
     for (int k = 0; k < 64; ++k) sums[kTileDoubles * t + k] = random.normal();
   for (std::size_t b = 0; b < 6; ++b)
     for (int i = 0; i < 8; ++i) {
-      diagonal[kDiagonalDoubles * b + 72 + i] = random.normal();
+      diagonal[kDiagonalDoubles * b + diagonal_layout::right_side(i)] = random.normal();
       for (int j = 0; j <= i; ++j)
         diagonal[kDiagonalDoubles * b + 8 * i + j] = diagonal[kDiagonalDoubles * b + 8 * j + i] =
             random.normal();
@@ -113,7 +113,7 @@ TEST(PatchBlocks, FoldingKeepsTheQuadraticForm) {
     double square = 0, linear = 0;
     for (std::size_t b = 0; b < v.size() / kStep; ++b)
       for (int i = 0; i < 8; ++i) {
-        linear += v[kStep * b + i] * on[kDiagonalDoubles * b + 72 + i];
+        linear += v[kStep * b + i] * on[kDiagonalDoubles * b + diagonal_layout::right_side(i)];
         for (int j = 0; j < 8; ++j)
           square += v[kStep * b + i] * on[kDiagonalDoubles * b + 8 * i + j] * v[kStep * b + j];
       }
