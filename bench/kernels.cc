@@ -49,7 +49,7 @@ struct Bench {
         c[camera_record::kTranslation + d] = problem.poses[i].translation[d];
         c[camera_record::kFocal + d] = problem.cameras[i].parameters[d];
       }
-      for (int d = 15; d < 24; ++d) c[d] = 1e-6;
+      std::fill(c + camera_record::kStep, c + kCameraRecord, 1e-6);
     }
     points.allocate(kPointGroup * batches.groups.size());
     for (std::size_t g = 0; g < batches.groups.size(); ++g)

@@ -37,13 +37,13 @@ namespace pose_record {
 constexpr int kRotation = 0, kTranslation = 9, kCount = 12;
 }
 
-/// Of a BAL camera: the pose, f, k1, k2, then the step to back-substitute: phi (3), rho (3) and
+/// Of a BAL camera: the pose, f, k1, k2, then the step to back-substitute: rho (3), phi (3) and
 /// what it does to f d: df, k1 df + f dk1, k2 df + f dk2 by 1, n and n^2.
 constexpr std::size_t kCameraRecord = 24;
 namespace camera_record {
 constexpr int kRotation = pose_record::kRotation, kTranslation = pose_record::kTranslation;
 constexpr int kFocal = 12, kK1 = 13, kK2 = 14;
-constexpr int kStep = 15, kPhi = 15, kRho = 18, kRadial = 21;
+constexpr int kStep = 15, kRho = 15, kPhi = 18, kRadial = 21;
 constexpr std::size_t kStateOctets = 2, kOctets = 3;  ///< eights to read: without the step, with it
 
 /// The step's nine fields from a camera's columns x; lens: f, k1, k2.

@@ -41,7 +41,7 @@ class DoglegKernelsTest : public testing::Test {
         c[camera_record::kTranslation + k] = problem.poses[i].translation[k];
         c[camera_record::kFocal + k] = problem.cameras[i].parameters[k];
       }
-      for (int k = 0; k < 9; ++k) c[15 + k] = 1e-3 * std::sin(double(9 * i + k));
+      for (int k = 0; k < 9; ++k) c[camera_record::kStep + k] = 1e-3 * std::sin(double(9 * i + k));
     }
     points_.allocate(kPointGroup * batches_.groups.size());
     for (std::size_t g = 0; g < batches_.groups.size(); ++g)

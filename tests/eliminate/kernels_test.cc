@@ -56,7 +56,7 @@ class KernelsTest : public ::testing::Test {
         const double t = c[camera_record::kTranslation + k] + R[0] * origin[0] + R[1] * origin[1] +
                          R[2] * origin[2];
         to[camera_record::kTranslation + k] = static_cast<float>(scale * t);
-        to[18 + k] = static_cast<float>(scale * c[18 + k]);
+        to[camera_record::kRho + k] = static_cast<float>(scale * c[camera_record::kRho + k]);
       }
     }
     return out;
@@ -73,10 +73,10 @@ class KernelsTest : public ::testing::Test {
         c[camera_record::kTranslation + k] = problem.poses[i].translation[k];
         c[camera_record::kFocal + k] = problem.cameras[i].parameters[k];
       }
-      for (int k = 0; k < 9; ++k) c[15 + k] = 1e-3 * std::sin(double(9 * i + k));
+      for (int k = 0; k < 9; ++k) c[camera_record::kStep + k] = 1e-3 * std::sin(double(9 * i + k));
       double* t = &trial_cameras_[kCameraRecord * i];
       std::copy(c, c + kCameraRecord, t);
-      t[9] += 0.01;
+      t[camera_record::kTranslation] += 0.01;
       t[camera_record::kFocal] *= 1.001;
     }
     points_.allocate(kPointGroup * batches_.groups.size());
