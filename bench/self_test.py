@@ -117,6 +117,10 @@ def check_pages():
                "missing": ["g2o-omp"], "problems": [canned_document()]}
     table = write_pages.readme_table(results)
     assert "| tiny | 1 | 0.400 | 6.00 | **15.0** |" in table, table
+    assert "50 steps." in table and run_table.MARK not in table
+    for r in results["problems"][0]["runs"]:
+        r["limit_s"] = 60.0
+    assert "50 steps and 60 s." in write_pages.readme_table(results)
     assert write_pages.between("a<!-- bench:begin -->old<!-- bench:end -->b", "new") == (
         "a<!-- bench:begin -->\nnew<!-- bench:end -->b")
     kernels = {"benchmarks": [{"name": "avx2/trial", "real_time": 4.0, "cpu_time": 2.0,
@@ -164,6 +168,13 @@ def check_suite():
     for svg in drawn.values():
         xml.dom.minidom.parseString(svg)
     section = suite_report.markdown(results, "plots")
+    assert run_table.MARK not in section
+    b = documents[1]
+    known = {**b, "problem": "ladybug-138", "best_cost": 33000.0, "time_limit_s": 2.5}
+    lower = suite_report.markdown({**results, "problems": [known, {**known, "time_limit_s": 4}]}, "")
+    assert "| ladybug-138 | synthetic | 1000 | 2 | 30000 | 33000 \u00b9 | 2.5, 4 | 3 |" in lower
+    assert "\u00b9 Not the lowest" in lower and "; f* = 33000.000000 \u00b9; at most 4 s" in lower
+    assert not run_table.footnote([{**known, "best_cost": 32103.53}])
     assert "Not on this machine: pba." in section
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "page.md")

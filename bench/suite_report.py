@@ -65,10 +65,12 @@ def problem_table(results):
     for d in {d["problem"]: d for d in results["problems"]}.values():
         counts = [f"{d['header'][k]}" for k in ("cameras", "points", "observations")]
         kind = "synthetic" if d["synthetic"] else "real"
-        same = [e["best_cost"] for e in results["problems"] if e["problem"] == d["problem"]]
-        rows.append([d["problem"], kind, *counts, f"{min(same):.6g}", f"{d['time_limit_s']:g}",
-                     str(d["turns"])])
-    return table(["problem", "kind", "cameras", "points", "observations", "best cost",
+        same = [e for e in results["problems"] if e["problem"] == d["problem"]]
+        limits = dict.fromkeys(f"{e['time_limit_s']:g}" for e in same)  # with fewer threads first
+        rows.append([d["problem"], kind, *counts,
+                     f"{min(e['best_cost'] for e in same):.6g}{run_table.mark(d)}",
+                     ", ".join(limits), str(d["turns"])])
+    return table(["problem", "kind", "cameras", "points", "observations", "f*",
                   "limit, s", "runs"], rows, 2)
 
 
@@ -158,7 +160,7 @@ def end_table(documents):
                      f"{ours['iterations']:.0f}", f"{sum(steps) / len(steps):.0f}" if steps else "",
                      f"{max(steps)}" if steps else "", f"{first:.1e}", f"{last:.1e}", f"{gap:.1e}"])
     return table(["problem", "stopped by", "precision", "steps", "CG a step", "most CG",
-                  "gradient, start", "end", "above best cost"], rows, 3)
+                  "gradient, start", "end", "above f*"], rows, 3)
 
 
 def profile(documents, tau):
@@ -283,7 +285,7 @@ def details(document, folder):
               if not r["runs"]]
     return "\n".join([
         f"<details><summary>{side_by_side.title(document)}</summary>\n",
-        f"{counts}; f* = {document['best_cost']:.6f}; at most {document['time_limit_s']:g} s a run."
+        f"{counts}; f* = {document['best_cost']:.6f}{run_table.mark(document)}; at most {document['time_limit_s']:g} s a run."
         + (f" Not on this machine: {', '.join(missing)}." if missing else "") + "\n",
         run_table.markdown(document["summary"]),
         *([f"Failed: {'; '.join(failed)}.\n"] if failed else []),
@@ -298,13 +300,18 @@ def markdown(results, folder):
            f"Written by `bench/suite.py`, {results['date']}; medians of interleaved runs in fresh "
            "processes, as many as the table says; the rules of [bench/README.md](bench/README.md). "
            "\"Synthetic\" problems are our own scenes of the size and kind of the published problem "
-           "of that name (`sheaf generate --like`), not that problem. \"miss\": the solver stopped "
-           "by itself before the target; \"> 60\": the limit of 60 s ended it. Each peer stands "
+           "of that name (`sheaf generate --like`), not that problem. f* is the best cost among a "
+           "problem's rows; where none of them converged (\"How our runs end\") it is where the best "
+           "one stood. \"miss\": the solver ended before the target, by itself or after its 50 "
+           "steps; \"> 9\": the limit of 9 s ended it (each problem's limits, where they differ "
+           "first that of one thread, stand in the table). A ratio behind \">\" is a cut-off, not a "
+           "measurement: the limit over our time, which the true one is above. Each peer stands "
            "with its quickest configuration for each problem, sheaf with what `auto` chose. "
            f"Machine: {run_table.machine_text(results['machine'])}.\n",
            problem_table(results)]
+    out += [text for text in (run_table.footnote(results["problems"]),) if text]
     for tau in TARGETS:
-        out += [f"### Seconds to {tau:g} of the best cost\n", speed_table(documents, tau),
+        out += [f"### Seconds to within {tau:g} of f*\n", speed_table(documents, tau),
                 f"![performance profile]({folder}/suite-profile-{tau:g}.svg)\n"]
     if small:
         out += ["### Against multicore PBA, k2 = 0\n",

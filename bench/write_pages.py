@@ -35,19 +35,26 @@ def readme_table(results):
     lines = ["| " + " | ".join(head) + " |", "|---" + "|--:" * (len(head) - 1) + "|"]
     for document in results["problems"]:
         ours = run_table.strongest(document["summary"], "sheaf", TAU)
-        cells = [stem(document), str(document["threads"]),
+        cells = [stem(document) + run_table.mark(document), str(document["threads"]),
                  run_table.seconds(ours and ours["time_to"][TAU])]
         for name, _ in peers:
             cells += peer_cells(document, name, ours)
         lines.append("| " + " | ".join(cells) + " |")
-    note = (f"Seconds from the built arrays to within 1e-6 of the best cost anyone found, set-up "
-            f"included, reading left out; medians of {results['runs']} interleaved runs. For each "
-            f"solver its quickest configuration measured. **Only the ratios (in bold) carry over "
-            f"to other machines; the seconds are those of this one:** "
-            f"{run_table.machine_text(results['machine'])}; {results['date']}. Ceres HEAD and g2o were built "
-            f"natively for it, with derivatives by hand; Ceres 2.1 is Debian's package. "
-            f"All configurations, targets and misses: [BENCHMARKS.md](BENCHMARKS.md).")
-    return "\n".join(lines) + "\n\n" + note + "\n"
+    note = ("Seconds from the built arrays to within 1e-6 of f*, the best cost among these rows (all "
+            "of them: [BENCHMARKS.md](BENCHMARKS.md)), set-up included, reading left out; medians "
+            f"of {results['runs']} interleaved runs; \"miss\": not within 50 steps{at_most(results)}. "
+            "For each solver its quickest configuration measured. **Only the ratios (in bold) carry "
+            "over, and those within a kind of processor; the seconds are those of this machine:** "
+            f"{run_table.machine_text(results['machine'])}; {results['date']}. Ceres HEAD and g2o "
+            "were built natively for it, with derivatives by hand; Ceres 2.1 is Debian's package.")
+    lower = run_table.footnote(results["problems"])
+    return "\n".join(lines) + "\n\n" + note + "\n" + ("\n" + lower if lower else "")
+
+
+def at_most(results):
+    """The limits that the runs had, in words."""
+    limits = [r["limit_s"] for d in results["problems"] for r in d["runs"] if "limit_s" in r]
+    return f" and {run_table.either(limits)} s" if limits else ""
 
 
 def peer_cells(document, name, ours):
@@ -120,8 +127,8 @@ def page(results, plots, kernels=None):
            "[bench/README.md](bench/README.md).\n",
            f"Machine: {run_table.machine_text(machine)}. {results['date']}. Medians of {results['runs']} "
            "interleaved runs in fresh processes. Times are seconds until the cost is at or below "
-           "f* (1 + tau), f* the best cost anyone found, set-up included, reading left out; "
-           "\"miss\": never. Cost is 1/2 sum |r|^2, 9-parameter cameras, no loss. \"Final cost\" is "
+           "f* (1 + tau), f* the best cost among the problem's rows, set-up included, reading left out; "
+           f"\"miss\": not within 50 steps{at_most(results)}. Cost is 1/2 sum |r|^2, 9-parameter cameras, no loss. \"Final cost\" is "
            "evaluated by code apart from all solvers; † marks a solver whose own figure differs (one "
            "that leaves observations out, say): its trace is not comparable and gets no times. "
            "\"Spread\" is (max - min) / median of the "
@@ -134,7 +141,7 @@ def page(results, plots, kernels=None):
     for document in results["problems"]:
         counts = ", ".join(f"{n} {what}" for what, n in document["header"].items())
         out += [f"## {side_by_side.title(document)}\n",
-                f"{counts}; f* = {document['best_cost']:.6f}.\n",
+                f"{counts}; f* = {document['best_cost']:.6f}{run_table.mark(document)}.\n",
                 run_table.markdown(document["summary"]),
                 f"![cost against time]({plots}/{side_by_side.plot_name(document)})\n"]
     if kernels:
