@@ -3,8 +3,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # Installs what Sheaf needs and this Debian or Ubuntu machine lacks.
-#   scripts/install-deps.sh         to build and test
-#   scripts/install-deps.sh --ci    also clang (fuzzing) and the pinned clang-format
+#   scripts/install-deps.sh             to build and test
+#   scripts/install-deps.sh --ci        also clang (fuzzing) and the pinned clang-format
+#   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
+#   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
+# Several at once will do.
 set -euo pipefail
 
 wanted=(cmake ninja-build g++ make pkg-config libtbb-dev libhwy-dev libfast-float-dev
@@ -42,15 +45,31 @@ ci_packages() {
     echo clang-format-14
   fi
 }
+# Clang 16 with the library that Macs have, or what comes next to it.
+libcxx_packages() {
+  local version
+  for version in 16 17 18 19 15 14; do
+    if is_installed "libc++-$version-dev" || is_offered "libc++-$version-dev"; then
+      echo "clang-$version" "libc++-$version-dev" "libc++abi-$version-dev"
+      return
+    fi
+  done
+}
+# A cross compiler, and an emulator that runs what it makes.
+arm64_packages=(g++-aarch64-linux-gnu qemu-user-static)
 missing_of() {
   local package
   for package in "$@"; do is_installed "$package" || echo "$package"; done
 }
 ci_complete() {
+  $ci || return 0
   local version
   version=$(default_clang)
   is_installed clang-format-14 && is_installed "clang-$version" &&
     is_installed "libclang-rt-$version-dev"
+}
+libcxx_complete() {
+  ! $libcxx || { is_installed clang-16 && is_installed libc++-16-dev; }
 }
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
@@ -58,10 +77,17 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   exit 0
 fi
 
-ci=false
-[ "${1:-}" = --ci ] && ci=true
+ci=false libcxx=false
+for flag in "$@"; do
+  case $flag in
+    --ci) ci=true ;;
+    --libcxx) libcxx=true ;;
+    --arm64) wanted+=("${arm64_packages[@]}") ;;
+    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64" >&2; exit 2 ;;
+  esac
+done
 mapfile -t missing < <(missing_of "${wanted[@]}")
-if [ ${#missing[@]} = 0 ] && { ! $ci || ci_complete; }; then
+if [ ${#missing[@]} = 0 ] && ci_complete && libcxx_complete; then
   echo "install-deps: nothing is missing"
   exit 0
 fi
@@ -70,10 +96,10 @@ export DEBIAN_FRONTEND=noninteractive
 apt_get() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 "$@"; }
 echo "install-deps: asking for the list of packages (apt-get update)"
 apt_get -qq update || echo "install-deps: apt-get update failed; trying with the lists at hand" >&2
-if $ci; then
-  read -r -a extra <<<"$(ci_packages | tr '\n' ' ')"
-  mapfile -t missing < <(missing_of "${wanted[@]}" "${extra[@]}")
-fi
+extra=()
+if $ci; then read -r -a extra <<<"$(ci_packages | tr '\n' ' ')"; fi
+if $libcxx; then read -r -a extra <<<"${extra[*]} $(libcxx_packages)"; fi
+mapfile -t missing < <(missing_of "${wanted[@]}" "${extra[@]}")
 if [ ${#missing[@]} = 0 ]; then
   echo "install-deps: nothing is missing"
   exit 0
