@@ -6,10 +6,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <sstream>
 
 #include "sheaf/error.h"
+
+#if defined(__APPLE__)
+#include <mach-o/dyld.h>
+#endif
 
 namespace sheaf {
 namespace {
@@ -94,10 +99,18 @@ void add_solver(const std::string& name, const std::string& config, const Progra
 }  // namespace
 
 fs::path own_program() {
+#if defined(__APPLE__)
+  char name[4096];
+  std::uint32_t size = sizeof name;
+  if (_NSGetExecutablePath(name, &size) != 0)
+    throw Error(ErrorCode::usage, "the name of this program is too long");
+  return fs::canonical(name);
+#else
   std::error_code error;
   const fs::path path = fs::read_symlink("/proc/self/exe", error);
   if (error) throw Error(ErrorCode::usage, "/proc/self/exe cannot be read: " + error.message());
   return path;
+#endif
 }
 
 SolverList find_solvers(const std::string& list, const std::string& folders, const Problem& problem,

@@ -51,7 +51,9 @@ Result<RawBytes> RawBytes::open(const std::filesystem::path& path) {
     return unreadable(raw.name_ + ": found a directory, expected a file");
   if (S_ISREG(status.st_mode)) {
     raw.size_ = static_cast<std::uint64_t>(status.st_size);
+#if defined(POSIX_FADV_SEQUENTIAL)
     ::posix_fadvise(raw.fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
+#endif
   }
   return raw;
 }
