@@ -13,6 +13,7 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "eliminate/lens_dogleg-inl.h"
 #include "eliminate/lens_eliminate-inl.h"
 #include "eliminate/lens_product-inl.h"
 #include "eliminate/lens_products-inl.h"
@@ -73,9 +74,28 @@ void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
   }
 }
 
+void sum_lens_gradient(const LensProductInput& in, const Chunk& chunk, double* sums) {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+    lens_gradient_group(in, g, sums);
+}
+
+void sum_lens_curvature(const LensProductInput& in, double damping, bool points_held,
+                        const Chunk& chunk, CurvatureOutput& out) {
+  lens_curvature_chunk(in, damping, points_held, chunk, out);
+}
+
+double sum_lens_point_damping(const LensProductInput& in, const Chunk& chunk) {
+  return lens_point_damping_chunk(in, chunk);
+}
+
+void keep_lens_rows(const LensProductInput& in, double unit, const Chunk& chunk, float* rows) {
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) keep_group(in, unit, g, rows);
+}
+
 constexpr LensKernels lens_table() {
-  return {set_name(HWY_TARGET), &linearize_lenses,   &multiply_lenses, &multiply_poses,
-          &try_lenses,          &multiply_by_lenses, &lens_residuals};
+  return {set_name(HWY_TARGET), &linearize_lenses,       &multiply_lenses, &multiply_poses,
+          &try_lenses,          &multiply_by_lenses,     &lens_residuals,  &sum_lens_gradient,
+          &sum_lens_curvature,  &sum_lens_point_damping, &keep_lens_rows};
 }
 
 }  // namespace HWY_NAMESPACE

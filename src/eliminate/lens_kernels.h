@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "eliminate/dogleg_kernels.h"
+#include "eliminate/kept_product.h"
 #include "eliminate/kernels.h"
 #include "lists/lens_tracks.h"
 
@@ -96,6 +98,20 @@ struct LensKernels {
   void (*product)(const LensProductInput&, const Chunk&, double* saved, double* y);
   /// |r_x| of a batch's eight lanes, then |r_y|, 16 per batch of the chunk.
   void (*residuals)(const LensInput&, const Chunk&, double* out);
+
+  // What a dogleg needs beyond a damped step (eliminate/dogleg_kernels.h), x being the cameras'
+  // step.
+
+  /// Adds -Jc^T r to the blocks' sums, kProductRecord each.
+  void (*gradient)(const LensProductInput&, const Chunk&, double* sums);
+  void (*curvature)(const LensProductInput&, double damping, bool points_held, const Chunk&,
+                    CurvatureOutput& out);
+  /// Sum over the chunk's points of d^T D d, d back-substituted.
+  double (*point_damping)(const LensProductInput&, const Chunk&);
+
+  /// Rows in single precision for products to come (eliminate/kept_product.h), the points' times
+  /// 1 / unit; x and the factors are not read.
+  void (*keep)(const LensProductInput&, double unit, const Chunk&, float* rows);
 };
 
 /// Plain scalar code, one observation at a time: the twin that the others are tested against.

@@ -221,7 +221,11 @@ const LensKernels& reference_lens_kernels() {
                                    &pose_pairs,
                                    &lens_trial_by_reference,
                                    &lens_product_by_reference,
-                                   &residuals};
+                                   &residuals,
+                                   &lens_gradient_by_reference,
+                                   &lens_curvature_by_reference,
+                                   &lens_point_damping_by_reference,
+                                   &keep_lens_rows_by_reference};
   return kernels;
 }
 

@@ -70,6 +70,21 @@ inline LensRow lens_row(const LensInput& in, const Vector3<double>& X, std::uint
   return row;
 }
 
+/// Numbers of an observation's blocks, the image's first.
+struct BlocksOfRow {
+  std::array<std::size_t, 3> block;
+  std::size_t count;
+
+  BlocksOfRow(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
+    const LensPlaces& lens = lens_of(in, batch, lane);
+    block = {in.batches->image[8 * batch + lane], lens.first_block, lens.first_block + 1};
+    count = std::size_t{1} + lens.blocks;
+  }
+  static const std::array<double, 9>& row(const LensRow& of, std::size_t k, std::size_t e) {
+    return k == 0 ? of.camera[e] : of.lens[k - 1][e];
+  }
+};
+
 /// The kernels of the other files (eliminate/lens_kernels.h).
 void lens_products_by_reference(const LensTracks& tracks, const LensTiles& tiles_of,
                                 const Chunks& chunks, const Chunk& chunk,
@@ -77,5 +92,11 @@ void lens_products_by_reference(const LensTracks& tracks, const LensTiles& tiles
 void lens_trial_by_reference(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out);
 void lens_product_by_reference(const LensProductInput& in, const Chunk& chunk, double* saved,
                                double* y);
+void lens_gradient_by_reference(const LensProductInput& in, const Chunk& chunk, double* sums);
+void lens_curvature_by_reference(const LensProductInput& in, double damping, bool points_held,
+                                 const Chunk& chunk, CurvatureOutput& out);
+double lens_point_damping_by_reference(const LensProductInput& in, const Chunk& chunk);
+void keep_lens_rows_by_reference(const LensProductInput& in, double unit, const Chunk& chunk,
+                                 float* rows);
 
 }  // namespace sheaf

@@ -111,21 +111,6 @@ void try_point(const LensTrialInput& in, std::size_t g, std::uint32_t lane, Tria
   out.step2_max = std::max(out.step2_max, moved / size);
 }
 
-/// Numbers of an observation's blocks, the image's first.
-struct BlocksOfRow {
-  std::array<std::size_t, 3> block;
-  std::size_t count;
-
-  BlocksOfRow(const LensInput& in, std::uint64_t batch, std::uint32_t lane) {
-    const LensPlaces& lens = lens_of(in, batch, lane);
-    block = {in.batches->image[8 * batch + lane], lens.first_block, lens.first_block + 1};
-    count = std::size_t{1} + lens.blocks;
-  }
-  static const std::array<double, 9>& row(const LensRow& of, std::size_t k, std::size_t e) {
-    return k == 0 ? of.camera[e] : of.lens[k - 1][e];
-  }
-};
-
 /// Of one point: e = Jc x, u = (V + D)^-1 sum Jp^T w e, y += Jc^T w (e - Jp u).
 void multiply_point(const LensProductInput& in, std::size_t g, std::uint32_t lane, double* y) {
   const Batches::Group& group = in.of.batches->groups[g];

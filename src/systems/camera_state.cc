@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "geometry/camera_model.h"
+#include "reduced/scaling.h"
 
 namespace sheaf {
 namespace {
@@ -21,6 +22,26 @@ CameraState camera_state(const Problem& problem) {
   for (const Pose& pose : problem.poses) out.poses.push_back({pose.rotation, pose.translation});
   out.sets.reserve(problem.cameras.size());
   for (const Camera& camera : problem.cameras) out.sets.push_back(camera.parameters);
+  return out;
+}
+
+SceneFrame scene_frame(const CameraState& state) {
+  const auto centre = [](const RigidMotion<double>& pose, std::size_t k) {
+    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+    const auto& t = pose.translation;
+    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  };
+  SceneFrame out;
+  const auto images = static_cast<double>(state.poses.size());
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const auto& pose : state.poses) out.origin[k] += centre(pose, k);
+    out.origin[k] /= images;
+  }
+  double length = 0;
+  for (const auto& pose : state.poses)
+    length += std::hypot(centre(pose, 0) - out.origin[0], centre(pose, 1) - out.origin[1],
+                         centre(pose, 2) - out.origin[2]);
+  out.unit = towards_one(length / images);
   return out;
 }
 

@@ -24,6 +24,14 @@ struct CameraState {
 
 /// The poses and lenses of a problem.
 CameraState camera_state(const Problem& problem);
+/// The mean camera centre, and the power of two that brings the cameras' mean distance from it next
+/// to 1: neither the place of the scene nor its unit matters about it. Summed in the images' order.
+struct SceneFrame {
+  std::array<double, 3> origin{};
+  double unit = 1;
+};
+SceneFrame scene_frame(const CameraState& state);
+
 /// Writes poses and lenses back.
 void store(const CameraState& state, Problem& problem);
 

@@ -41,7 +41,9 @@ bool loses_parallax(SolverKind kind, PointParametrisation points) {
 }
 
 bool takes_mixed(SolverKind kind, const WorkCounts& counts, const SolveOptions& options) {
-  if (counts.any_lens && kind == SolverKind::implicit_cg) return false;
+  // Rows through lenses are kept for it: memory that is given where it is asked for.
+  if (counts.any_lens && kind == SolverKind::implicit_cg)
+    return options.precision == Precision::mixed;
   switch (options.precision) {
     case Precision::full:
       return false;
@@ -101,7 +103,8 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   choice.forecast_bytes = forecast(choice.plan);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
-  Plan leanest{SolverKind::implicit_cg, "", takes_mixed(SolverKind::implicit_cg, counts, options)};
+  Plan leanest{SolverKind::implicit_cg, "",
+               !counts.any_lens && takes_mixed(SolverKind::implicit_cg, counts, options)};
   const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
       !counts.only_formed && lean <= options.memory_limit_bytes) {

@@ -135,6 +135,7 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
   }
   if (kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg)
     add_iterative(c, plan, slices, sum);
+  if (kind == SolverKind::implicit_cg && plan.mixed) sum.add(8 * c.kept_fields * c.batches, 4);
   if (c.dogleg) add_dogleg(c, kind, slices, sum);
   if (kind == SolverKind::blocks) sum.add(c.images, 81 * 8 + 76);
   return sum.bytes();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "eliminate/kept_product.h"
+
 namespace sheaf {
 namespace {
 
@@ -25,6 +27,7 @@ WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clu
   WorkCounts c = count_work(arranged.batches, image_columns(tracks, arranged.columns, true),
                             points_held, clusters, threads);
   c.any_lens = true;
+  c.kept_fields = kept_row::fields(tracks.most_blocks);
   c.images_couple = !points_held || tracks.most_blocks > 0;
   const auto images = static_cast<double>(c.columns);
   const LensColumns more(tracks);

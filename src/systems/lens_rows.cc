@@ -3,9 +3,12 @@
 #include "systems/lens_rows.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "geometry/camera_model.h"
+#include "reduced/scaling.h"
+#include "systems/dogleg_passes.h"
 #include "systems/implicit_solver.h"
 #include "systems/product_sums.h"
 #include "systems/residual_quantile.h"
@@ -32,10 +35,101 @@ class LensRows::Operator : public StateOperator {
               });
   }
   std::uint64_t bytes() const override { return sums_.bytes(); }
+  ProductSums& sums() { return sums_; }
 
  private:
   const LensRows& rows_;
   ProductSums sums_;
+};
+
+/// S x with rows kept in single precision; the sums over blocks are double. x is scaled by its
+/// columns before it is rounded, so that the result depends on no unit.
+class LensRows::RoundedOperator : public StateOperator {
+ public:
+  RoundedOperator(const LensRows& rows, const Columns& columns, ProductSums& sums)
+      : rows_(rows),
+        columns_(columns),
+        sums_(sums),
+        kept_(8 * kept_row::fields(rows.arranged_.tracks.most_blocks) *
+              rows.arranged_.batches.num_batches()),
+        x_(kBlockVector * columns.num_images()) {}
+
+  void prepare(const double* squares) override {
+    squares_ = squares;
+    unit_ = scene_frame(rows_.state_->held.cameras).unit;
+    const SteppedState& state = *rows_.state_;
+    const LensProductInput in{rows_.held_input(), state.factors.data(), state.weights.data()};
+    const std::vector<Chunk>& chunks = rows_.chunks_.chunks;
+    rows_.threads_.for_each(chunks.size(), [&](std::size_t c) {
+      rows_.lens_kernels_.keep(in, unit_, chunks[c], kept_.data());
+    });
+  }
+
+  void apply(const double* x, double* y) override {
+    const double scale = scale_of_step(x);
+    for (std::size_t i = 0; i < x_.size(); ++i) x_[i] = static_cast<float>(scale * x[i]);
+    const KeptProductInput in{&rows_.arranged_.batches,
+                              &rows_.arranged_.tracks,
+                              kept_.data(),
+                              rows_.state_->factors.data(),
+                              unit_,
+                              x_.data()};
+    sums_.run([&](const Chunk& chunk, double*,
+                  double* sums) { rows_.kept_product_.product(in, chunk, sums); },
+              [&](std::size_t i, const double* total) {
+                for (std::size_t k = 0; k < kCameraColumns; ++k)
+                  y[kBlockVector * i + k] = total[k] / scale;
+              });
+  }
+  std::uint64_t bytes() const override { return kept_.bytes() + x_.bytes(); }
+
+ private:
+  /// x scaled by its columns is what the residuals see of it, at most in pixels: next to 1.
+  double scale_of_step(const double* x) const {
+    double most = 0;
+    for (std::size_t i = 0; i < columns_.num_images(); ++i)
+      for (int k = 0; k < kCameraColumns; ++k)
+        if (const std::int32_t c = columns_.image(i)[k]; c >= 0)
+          most = std::max(most, std::sqrt(squares_[c]) *
+                                    std::abs(x[kBlockVector * i + static_cast<std::size_t>(k)]));
+    return towards_one(most);
+  }
+
+  const LensRows& rows_;
+  const Columns& columns_;
+  ProductSums& sums_;
+  Buffer<float> kept_, x_;
+  const double* squares_ = nullptr;
+  double unit_ = 1;
+};
+
+/// What a dogleg asks of these rows.
+class LensRows::Dogleg : public DoglegSource {
+ public:
+  explicit Dogleg(const LensRows& rows) : rows_(rows), x_(kBlockVector * rows.num_blocks()) {}
+
+  void write_step(std::size_t block, const double* x) override {
+    std::copy_n(x, kCameraColumns, &x_[kBlockVector * block]);
+  }
+  void gradient(const Chunk& chunk, double* sums) override {
+    rows_.lens_kernels_.gradient(input(), chunk, sums);
+  }
+  void curvature(const Chunk& chunk, double lambda, bool points_held,
+                 CurvatureOutput& out) override {
+    rows_.lens_kernels_.curvature(input(), lambda, points_held, chunk, out);
+  }
+  double point_damping(const Chunk& chunk) override {
+    return rows_.lens_kernels_.point_damping(input(), chunk);
+  }
+
+ private:
+  LensProductInput input() const {
+    const SteppedState& state = *rows_.state_;
+    return {rows_.held_input(), state.factors.data(), state.weights.data(), x_.data()};
+  }
+
+  const LensRows& rows_;
+  Buffer<double> x_;  ///< kBlockVector per block
 };
 
 LensRows::LensRows(const Arrangement& arrangement, const Kernels& kernels, Threads& threads)
@@ -43,6 +137,7 @@ LensRows::LensRows(const Arrangement& arrangement, const Kernels& kernels, Threa
       chunks_(arrangement.lists.chunks),
       kernels_(kernels),
       lens_kernels_(lens_kernels(kernels.name)),
+      kept_product_(kept_product(kernels.name)),
       threads_(threads),
       poses_alone_(std::all_of(arrangement.tracks.lenses.begin(), arrangement.tracks.lenses.end(),
                                [](const LensPlaces& lens) { return lens.riders == 0; })),
@@ -161,10 +256,14 @@ double LensRows::residual_scale(double quantile) const {
       [&](const Chunk& chunk, double* out) { lens_kernels_.residuals(held_input(), chunk, out); });
 }
 
-std::unique_ptr<CameraSolver> LensRows::make_implicit(const Columns& columns, bool) {
-  return make_implicit_solver(columns, std::make_unique<Operator>(*this, columns), nullptr,
-                              threads_);
+std::unique_ptr<CameraSolver> LensRows::make_implicit(const Columns& columns, bool mixed) {
+  auto exact = std::make_unique<Operator>(*this, columns);
+  std::unique_ptr<StateOperator> rounded;
+  if (mixed) rounded = std::make_unique<RoundedOperator>(*this, columns, exact->sums());
+  return make_implicit_solver(columns, std::move(exact), std::move(rounded), threads_);
 }
+
+std::unique_ptr<DoglegSource> LensRows::make_dogleg() { return std::make_unique<Dogleg>(*this); }
 
 std::uint64_t LensRows::bytes() const {
   return held_.images.bytes() + held_.lenses.bytes() + tried_.images.bytes() +

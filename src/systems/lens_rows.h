@@ -4,8 +4,10 @@
 
 #include <memory>
 
+#include "eliminate/kept_product.h"
 #include "eliminate/lens_kernels.h"
 #include "systems/arrangement.h"
+#include "systems/dogleg_passes.h"
 #include "systems/point_rows.h"
 
 namespace sheaf {
@@ -32,10 +34,13 @@ class LensRows : public PointRows {
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
   std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
+  std::unique_ptr<DoglegSource> make_dogleg() override;
   std::uint64_t bytes() const override;
 
  private:
   class Operator;
+  class RoundedOperator;
+  class Dogleg;
   struct LensCameras {
     Buffer<double> images, lenses;  ///< kImageRecord, kLensRecord each
   };
@@ -52,6 +57,7 @@ class LensRows : public PointRows {
   const Chunks& chunks_;
   const Kernels& kernels_;
   const LensKernels& lens_kernels_;
+  const KeptProduct& kept_product_;
   Threads& threads_;
   const bool poses_alone_;  ///< nothing rides with them
   const LensScratch layout_;

@@ -42,6 +42,7 @@ struct WorkCounts {
   bool dogleg = false;            ///< the gradient is summed by image, steps are blended
   bool only_formed = false;       ///< there is no implicit product
   bool any_lens = false;          ///< lenses of any model: implicit products are dearer, and double
+  std::uint64_t kept_fields = 0;  ///< of a batch's rows, where a mixed implicit solver keeps them
   std::uint64_t other_bytes = 0;  ///< held besides
 
   static constexpr std::uint64_t kExactImages = 20000;

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "lists/slices.h"
-#include "reduced/scaling.h"
 
 namespace sheaf {
 namespace {
@@ -79,28 +78,15 @@ void PointSystem::fill_points(const std::vector<double>& points) {
   });
 }
 
-/// Homogeneous points are about the mean camera centre, in units of the cameras' mean distance from
-/// it, so that neither the place of the scene nor its unit matters. Points that are held have no
-/// charts: nothing of them may move.
+/// Homogeneous points are about the frame of the scene. Points that are held have no charts:
+/// nothing of them may move.
 void PointSystem::place_charts() {
   if (rules_.held || rules_.charts == ChartBase::none) return;
-  const std::vector<RigidMotion<double>>& poses = state_.held.cameras.poses;
-  const auto centre = [](const RigidMotion<double>& pose, std::size_t k) {
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    const auto& t = pose.translation;
-    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-  };
+  const SceneFrame frame = scene_frame(state_.held.cameras);
   chart_.base = rules_.charts;
   chart_.crosses = !rules_.watch_behind;
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (const auto& pose : poses) chart_.origin[k] += centre(pose, k);
-    chart_.origin[k] /= static_cast<double>(poses.size());
-  }
-  double length = 0;
-  for (const auto& pose : poses)
-    length += std::hypot(centre(pose, 0) - chart_.origin[0], centre(pose, 1) - chart_.origin[1],
-                         centre(pose, 2) - chart_.origin[2]);
-  chart_.unit = towards_one(length / static_cast<double>(poses.size()));
+  chart_.origin = frame.origin;
+  chart_.unit = frame.unit;
 }
 
 Step PointSystem::propose(const StepRequest& request) {

@@ -47,7 +47,10 @@ struct Settings {
 
 /// Everything that the kernels produce from one state.
 struct Outcome {
-  Buffer<double> tiles, diagonal, factors, weights, product, trial_points, residuals;
+  Buffer<double> tiles, diagonal, factors, weights, product, gradient, trial_points, residuals;
+  Buffer<float> kept;
+  CurvatureOutput curvature{};
+  double point_damping = 0;
   EliminateOutput eliminated{};
   TrialOutput trial{};
 };
@@ -157,8 +160,13 @@ void LensProblem::multiply(const LensKernels& kernels, Outcome& out) const {
       if (const double size = column_size(out.diagonal, b, k); size > 0)
         x[kProductRecord * b + std::size_t(k)] = std::sin(double(9 * b) + k) / size;
   const LensProductInput in{input(), out.factors.data(), out.weights.data(), x.data()};
-  for (const Chunk& chunk : chunks_.chunks.chunks)
+  for (const Chunk& chunk : chunks_.chunks.chunks) {
     kernels.product(in, chunk, saved.data(), out.product.data());
+    kernels.gradient(in, chunk, out.gradient.data());
+    kernels.curvature(in, settings_.damping, settings_.points_held, chunk, out.curvature);
+    out.point_damping += kernels.point_damping(in, chunk);
+    kernels.keep(in, 0.5, chunk, out.kept.data());
+  }
 }
 
 Outcome LensProblem::run(const LensKernels& kernels) const {
@@ -167,11 +175,14 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
   out.tiles.allocate(kTileDoubles * std::max<std::size_t>(1, chunks_.chunks.tiles.size()));
   out.diagonal.allocate(kDiagonalDoubles * arranged_.tracks.num_blocks);
   out.product.allocate(kProductRecord * arranged_.tracks.num_blocks);
+  out.kept.allocate(8 * kept_row::fields(arranged_.tracks.most_blocks) * batches.num_batches());
+  out.gradient.allocate(kProductRecord * arranged_.tracks.num_blocks);
   out.factors.allocate(kFactorGroup * batches.groups.size());
   if (settings_.loss.kind != LossKind::none) out.weights.allocate(8 * batches.num_batches());
   out.trial_points.allocate(points_.size());
   out.residuals.allocate(16 * batches.num_batches());
-  for (Buffer<double>* of : {&out.tiles, &out.diagonal, &out.product, &out.factors}) of->fill(0);
+  for (Buffer<double>* of : {&out.tiles, &out.diagonal, &out.product, &out.gradient, &out.factors})
+    of->fill(0);
   out.eliminated.factors = out.factors.data();
   out.eliminated.weights = out.weights.data();
   out.trial.points = out.trial_points.data();
@@ -214,6 +225,10 @@ void LensProblem::expect_agreement(const LensKernels& kernels, const Outcome& ex
       ASSERT_NEAR(got.product[at], expected.product[at],
                   10 * tolerance * column_size(expected.diagonal, b, k))
           << "product, block " << b << ", " << k;
+      const double residual = std::sqrt(expected.eliminated.square_sum);
+      ASSERT_NEAR(got.gradient[at], expected.gradient[at],
+                  10 * tolerance * residual * column_size(expected.diagonal, b, k))
+          << "gradient, block " << b << ", " << k;
     }
   expect_close(got.factors, expected.factors, tolerance, "factor");
   expect_close(got.weights, expected.weights, 1e-10, "weight");
@@ -228,6 +243,11 @@ void LensProblem::expect_agreement(const LensKernels& kernels, const Outcome& ex
   near(got.trial.loss_sum, expected.trial.loss_sum);
   near(got.trial.damping_term, expected.trial.damping_term);
   near(got.trial.step2_max, expected.trial.step2_max);
+  near(got.curvature.square_sum, expected.curvature.square_sum);
+  near(got.curvature.gradient2, expected.curvature.gradient2);
+  near(got.point_damping, expected.point_damping);
+  for (std::size_t i = 0; i < got.kept.size(); ++i)
+    ASSERT_NEAR(got.kept[i], expected.kept[i], 1e-5 * (1 + std::abs(expected.kept[i]))) << i;
 }
 
 /// The compiled instruction sets that the machine has, and the baseline.

@@ -11,26 +11,26 @@
 namespace sheaf {
 namespace {
 
-PhotometricScene forty_images() {
+PhotometricScene many_images() {
   PhotometricSceneOptions options;
-  options.images = 40;
-  options.points = 400;
+  options.images = 24;
+  options.points = 200;
   options.width = 96;
   options.height = 72;
   options.brightness = 0.05;
-  options.noise_grey = 1;
-  options.start_px = 0.4;
+  options.noise_grey = 0.5;
+  options.start_px = 0.05;
   return generate(options).value();
 }
 
 PhotometricOptions options_of(CameraSolverKind solver) {
   PhotometricOptions options;
   options.solver = solver;
-  options.tolerance = 1e-12;
+  options.tolerance = 1e-14;
   options.motion_px = 1e-6;
-  options.max_iterations = 60;
+  options.max_iterations = 100;
   options.rounds = 1;
-  options.loss = Huber{20};
+  options.loss = {};
   return options;
 }
 
@@ -43,7 +43,7 @@ double final_cost(const PhotometricProblem& start, const PhotometricOptions& opt
 }
 
 TEST(PhotometricSolvers, ConjugateGradientsEndWhereDenseDoes) {
-  const PhotometricScene scene = forty_images();
+  const PhotometricScene scene = many_images();
   const double dense = final_cost(scene.start, options_of(CameraSolverKind::dense), "dense");
   for (const auto& [solver, name] :
        {std::pair{CameraSolverKind::sparse, "sparse"},
