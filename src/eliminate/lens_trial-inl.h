@@ -147,17 +147,11 @@ HWY_INLINE void lens_trial_part(const LensTrialInput& in, std::size_t g, int par
     refine_lens_points<Robust>(in, group, lane, pd, mask, y);
   else
     y.at = pass_lens_group<Robust, false>(in, group, lane, y.X, unused);
-  V moved = zero(), size = set(1e-300);
-  for (int i = 0; i < 3; ++i) {
-    store(y.X[i], stepped + kPointGroup * g + 8 * i + lane);
-    const V change = hn::Sub(y.X[i], X[i]);
-    moved = fma(change, change, moved);
-    size = fma(X[i], X[i], size);
-  }
+  for (int i = 0; i < 3; ++i) store(y.X[i], stepped + kPointGroup * g + 8 * i + lane);
   sums.square[part] = fma(y.at.square, mask, sums.square[part]);
   if (Robust) sums.loss[part] = fma(y.at.cost, mask, sums.loss[part]);
   sums.damping[part] = fma(damping, mask, sums.damping[part]);
-  sums.step2[part] = hn::Max(sums.step2[part], hn::Div(moved, size));
+  sums.step2[part] = hn::Max(sums.step2[part], relative_step2(X, y.X[0], y.X[1], y.X[2]));
 }
 
 template <bool Robust>

@@ -203,15 +203,14 @@ HWY_INLINE void back_substitute_part(const RowTrialInput& in, const Batches::Gro
   V d[3];
   const V term = back_substitute(in.factors + kFactorGroup * g + lane, s, d);
   damping = fma(term, lane_mask(group.lanes, lane), damping);
-  V moved = zero(), size = set(1e-300);
+  V X[3], Y[3];
   for (int i = 0; i < 3; ++i) {
     const std::size_t at = kPointGroup * g + 8 * i + lane;
-    const V X = load(in.points + at);
-    store(hn::Add(X, d[i]), stepped + at);
-    moved = fma(d[i], d[i], moved);
-    size = fma(X, X, size);
+    X[i] = load(in.points + at);
+    Y[i] = hn::Add(X[i], d[i]);
+    store(Y[i], stepped + at);
   }
-  step2 = hn::Max(step2, hn::Div(moved, size));
+  step2 = hn::Max(step2, relative_step2(X, Y[0], Y[1], Y[2]));
 }
 
 template <class Source>

@@ -297,6 +297,13 @@ struct ChartedStep {
   }
 };
 
+/// |Y - X|^2 / |X|^2.
+HWY_INLINE V relative_step2(const V* X, V Y0, V Y1, V Y2) {
+  const V d0 = hn::Sub(Y0, X[0]), d1 = hn::Sub(Y1, X[1]), d2 = hn::Sub(Y2, X[2]);
+  const V moved = fma(d0, d0, fma(d1, d1, hn::Mul(d2, d2)));
+  return hn::Div(moved, fma(X[0], X[0], fma(X[1], X[1], fma(X[2], X[2], set(1e-300)))));
+}
+
 template <bool Robust, bool Charted>
 HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, std::size_t g,
                            int part, double* stepped, TrialSums& sums) {
@@ -329,13 +336,10 @@ HWY_INLINE void trial_part(const TrialInput& in, const Batches::Group& group, st
     y.at = pass_group<Robust, false>(in, group, lane, y.X0, y.X1, y.X2, nullptr, unused);
   double* Y = stepped + kPointGroup * g + lane;
   store(y.X0, Y), store(y.X1, Y + 8), store(y.X2, Y + 16);
-  const V d0 = hn::Sub(y.X0, X[0]), d1 = hn::Sub(y.X1, X[1]), d2 = hn::Sub(y.X2, X[2]);
-  const V moved = fma(d0, d0, fma(d1, d1, hn::Mul(d2, d2)));
-  const V x2 = fma(X[0], X[0], fma(X[1], X[1], fma(X[2], X[2], set(1e-300))));
   sums.square[part] = fma(y.at.square, mask, sums.square[part]);
   if (Robust) sums.loss[part] = fma(y.at.cost, mask, sums.loss[part]);
   sums.damping[part] = fma(damping, mask, sums.damping[part]);
-  V step2 = hn::Div(moved, x2);
+  V step2 = relative_step2(X, y.X0, y.X1, y.X2);
   if constexpr (Charted) step2 = charted.size2(in, mask, y);
   sums.step2[part] = hn::Max(sums.step2[part], step2);
   if (in.count_newly_behind)
