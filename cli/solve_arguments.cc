@@ -34,11 +34,9 @@ const std::map<std::string, CameraSolverKind> kSolvers = {
     {"iterative-implicit", CameraSolverKind::iterative_implicit}};
 const std::map<std::string, Precision> kPrecisions = {
     {"auto", Precision::automatic}, {"double", Precision::full}, {"mixed", Precision::mixed}};
-const std::map<std::string, Simd> kSimds = {{"best", Simd::best},
-                                            {"scalar", Simd::scalar},
-                                            {"sse4", Simd::sse4},
-                                            {"avx2", Simd::avx2},
-                                            {"avx512", Simd::avx512}};
+const std::map<std::string, Simd> kSimds = {{"best", Simd::best},     {"scalar", Simd::scalar},
+                                            {"sse4", Simd::sse4},     {"avx2", Simd::avx2},
+                                            {"avx512", Simd::avx512}, {"neon", Simd::neon}};
 
 /// How the camera system is solved, in what, and within which memory.
 void add_solver_options(CLI::App& verb, SolveArguments& a) {
@@ -83,10 +81,11 @@ void add_solver_options(CLI::App& verb, SolveArguments& a) {
       ->type_name("N")
       ->check(whole_number_from(0, "a whole number from 0 up"))
       ->capture_default_str();
-  verb.add_option("--simd", a.simd,
-                  "instruction set: best, scalar, sse4, avx2, avx512 (for tests and measurements)")
+  verb.add_option(
+          "--simd", a.simd,
+          "instruction set: best, scalar, sse4, avx2, avx512, neon (for tests and measurements)")
       ->type_name("NAME")
-      ->check(one_of({"best", "scalar", "sse4", "avx2", "avx512"}))
+      ->check(one_of({"best", "scalar", "sse4", "avx2", "avx512", "neon"}))
       ->capture_default_str();
 }
 

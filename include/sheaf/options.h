@@ -29,8 +29,9 @@ enum class PointParametrisation {
   inverse_depth,  ///< bearing and inverse depth from the first image that sees it: likewise
 };
 
-/// Instruction set of the hot kernels.
-enum class Simd { best, scalar, sse4, avx2, avx512 };
+/// Instruction set of the hot kernels. An x86-64 processor has those up to some point of the list
+/// before neon; a 64-bit ARM one has neon alone.
+enum class Simd { best, scalar, sse4, avx2, avx512, neon };
 
 /// What bounds a step that the cost did not follow.
 enum class TrustRegion {

@@ -44,7 +44,13 @@ struct InstructionSet {
   std::int64_t target;  ///< as Highway numbers it
 };
 constexpr InstructionSet kInstructionSets[] = {
-    {"avx512", HWY_AVX3}, {"avx2", HWY_AVX2}, {"sse4", HWY_SSE4}, {"scalar", HWY_SCALAR}};
+#if defined(__aarch64__)
+    {"neon", HWY_STATIC_TARGET},  // whichever of Highway's kinds of NEON
+#endif
+    {"avx512", HWY_AVX3},
+    {"avx2", HWY_AVX2},
+    {"sse4", HWY_SSE4},
+    {"scalar", HWY_SCALAR}};
 
 /// What tables of this target are called.
 constexpr const char* set_name(std::int64_t target) {

@@ -15,4 +15,13 @@
 #else
 #define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_SSE4 | HWY_AVX2 | HWY_AVX3))
 #endif
+#elif defined(__aarch64__)
+// One: NEON, which every such machine has, with fused multiply-add. SVE stays off, whose vectors
+// have no size at compile time and go into no array. Without a choice at run time Highway marks no
+// function as for another target than its file's, so that constructors which are not written out,
+// and would not be marked, may take part. (Its older releases know the last name alone.)
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#define HWY_COMPILE_ONLY_STATIC 1
+#define HWY_HAVE_RUNTIME_DISPATCH 0
+#define TOOLCHAIN_MISS_SYS_AUXV_H 1
 #endif

@@ -25,6 +25,8 @@ const char* simd_name(Simd simd) {
       return "avx2";
     case Simd::avx512:
       return "avx512";
+    case Simd::neon:
+      return "neon";
     case Simd::best:
       break;
   }

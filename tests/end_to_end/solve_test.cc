@@ -119,7 +119,7 @@ TEST_F(SolveVerb, InstructionSetsAgree) {
   ASSERT_EQ(run({"solve", "in.txt", "-o", "best.txt", "--json", "best.json"}).exit_code, 0);
   const double cost = json("best.json")["final_cost"];
   std::string fused;  // output of a target with fused multiply-add
-  for (const std::string simd : {"scalar", "sse4", "avx2", "avx512"}) {
+  for (const std::string simd : {"scalar", "sse4", "avx2", "avx512", "neon"}) {
     const Outcome outcome =
         run({"solve", "in.txt", "-o", simd + ".txt", "--json", simd + ".json", "--simd", simd});
     if (outcome.exit_code == 2) continue;  // not on this machine

@@ -64,7 +64,7 @@ Collapsed collapse(const Patches& p, const char* simd, const ScaledLoss& loss, b
 }
 
 int lanes_of(const std::string& simd) {
-  return simd == "avx512" ? 8 : simd == "avx2" ? 4 : simd == "sse4" ? 2 : 1;
+  return simd == "avx512" ? 8 : simd == "avx2" ? 4 : simd == "sse4" || simd == "neon" ? 2 : 1;
 }
 
 double row_field(const Collapsed& of, int lanes, std::uint64_t batch, int lane, int field) {

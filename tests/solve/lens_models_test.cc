@@ -109,7 +109,7 @@ TEST(LensModels, EveryInstructionSetAndThreadCountEndsAlike) {
     options.threads = 3;
     const Solved threads(start, options);
     EXPECT_EQ(state_hash(best.problem), state_hash(threads.problem));
-    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2}) {
+    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::neon}) {
       options.simd = simd;
       Problem problem = start;
       const Result<Summary> other = try_solve(problem, options);

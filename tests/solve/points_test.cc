@@ -187,7 +187,7 @@ TEST(Points, ThreadsAndInstructionSetsChangeNothing) {
       EXPECT_EQ(problem.points, expected.points) << threads << " threads";
     }
     std::vector<Problem> fused;
-    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::avx512}) {
+    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::avx512, Simd::neon}) {
       options.points = points;
       options.simd = simd;
       Problem problem = start;

@@ -240,7 +240,7 @@ TEST(Solve, InstructionSetsAgree) {
   Problem best = start;
   const Summary reference = solve(best, options);
   std::vector<Problem> fused;
-  for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::avx512}) {
+  for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::avx512, Simd::neon}) {
     Problem problem = start;
     options.simd = simd;
     const Result<Summary> s = try_solve(problem, options);
