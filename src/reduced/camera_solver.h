@@ -12,6 +12,7 @@
 #include "lists/columns.h"
 #include "platform/buffer.h"
 #include "platform/parallel.h"
+#include "reduced/recycled_modes.h"
 
 namespace sheaf {
 
@@ -62,6 +63,9 @@ class CameraSolver {
   /// What solve() would have found with the smaller radius that alone is new, without another
   /// product; not solved: its x keeps within that radius, or the solver ends nowhere before.
   virtual CameraSolution shorten(const CameraSystem&, Buffer<double>&) { return {}; }
+  /// What one solve leaves to the next; nothing, unless it iterates.
+  virtual RecycledModes::History history() const { return {}; }
+  virtual void restore(const RecycledModes::History&) {}
   virtual std::uint64_t bytes() const = 0;
 };
 

@@ -243,6 +243,21 @@ void CoarseSpace::add_correction(const double* r, double* z) const {
   }
 }
 
+CoarseSpace::History CoarseSpace::history() const {
+  const auto summed = static_cast<std::ptrdiff_t>(kCoarseTile * tiles_);
+  return {schedule_,
+          {basis_.begin(), basis_.end()},
+          {sums_.begin(), sums_.begin() + summed},
+          {own_.begin(), own_.end()}};
+}
+
+void CoarseSpace::restore(const History& history) {
+  schedule_ = history.schedule;
+  std::copy(history.basis.begin(), history.basis.end(), basis_.begin());
+  std::copy(history.sums.begin(), history.sums.end(), sums_.begin());
+  std::copy(history.own.begin(), history.own.end(), own_.begin());
+}
+
 std::uint64_t CoarseSpace::bytes() const {
   return bytes(columns_.num_images(), clusters_.count, tiles_, slices_);
 }

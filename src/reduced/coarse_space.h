@@ -40,6 +40,14 @@ class CoarseSpace {
   /// z += Z E^-1 Z^T r.
   void add_correction(const double* r, double* z) const;
 
+  /// The matrix that is kept, and when it is to be summed anew.
+  struct History {
+    CoarseSchedule schedule;
+    std::vector<double> basis, sums, own;
+  };
+  History history() const;
+  void restore(const History& history);
+
   std::int32_t num_clusters() const { return clusters_.count; }
   /// Z of an image: rows 0..6 of its nine x modes, row-major.
   const double* basis(std::size_t image) const { return &basis_[kCoarseBasis * image]; }

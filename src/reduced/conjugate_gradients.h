@@ -81,6 +81,9 @@ class ConjugateGradients {
   /// x where the path of the last run meets the radius of `system`.
   CameraSolution shorten(const CameraSystem& system, Buffer<double>& x);
 
+  RecycledModes::History history() const { return modes_.history(); }
+  void restore(const RecycledModes::History& history) { modes_.restore(history); }
+
   std::uint64_t bytes() const;
 
  private:

@@ -159,6 +159,8 @@ class ExplicitSolver : public CameraSolver {
   CameraSolution shorten(const CameraSystem& system, Buffer<double>& x) override {
     return cg_.shorten(system, x);
   }
+  RecycledModes::History history() const override { return cg_.history(); }
+  void restore(const RecycledModes::History& history) override { cg_.restore(history); }
   std::uint64_t bytes() const override {
     return (rounded_ ? rounded_->bytes() : exact_->bytes()) + blocks_.bytes() + cg_.bytes();
   }

@@ -94,4 +94,19 @@ void RecycledModes::correct(const double* r, double* z) const {
   }
 }
 
+RecycledModes::History RecycledModes::history() const {
+  History out{kept_, next_, {}, weight_};
+  out.modes.assign(modes_.begin(), modes_.begin() + kept_ * length_);
+  return out;
+}
+
+void RecycledModes::restore(const History& history) {
+  kept_ = history.kept;
+  next_ = history.next;
+  weight_ = history.weights;
+  if (kept_ == 0) return;
+  if (modes_.size() == 0) modes_.allocate(kMost * length_);
+  std::copy(history.modes.begin(), history.modes.end(), modes_.begin());
+}
+
 }  // namespace sheaf

@@ -33,6 +33,16 @@ class RecycledModes {
   /// z += sum_j (1 / theta_j - 1) y_j (y_j . r).
   void correct(const double* r, double* z) const;
 
+  /// What it knows, to be written down; a run in progress is not part of it.
+  struct History {
+    std::size_t kept = 0, next = 0;
+    std::vector<float> modes;     ///< of `length` numbers each
+    std::vector<double> weights;  ///< of each mode
+  };
+  History history() const;
+  /// Of modes of the same length, as history() gave it.
+  void restore(const History& history);
+
   std::size_t count() const { return kept_; }
   std::uint64_t bytes() const { return basis_.bytes() + modes_.bytes(); }
   /// What a run of many iterations makes of it.

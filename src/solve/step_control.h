@@ -76,6 +76,18 @@ class StepControl {
     radius_ = std::min(radius_, trial->length) / shorten_;
     shorten_ *= 2;
   }
+  /// All of it, to be written down.
+  struct State {
+    Damping damping{0};
+    double radius = 0, shorten = 0;
+  };
+  State state() const { return {damping_, radius_, shorten_}; }
+  void restore(const State& state) {
+    damping_ = state.damping;
+    radius_ = state.radius;
+    shorten_ = state.shorten;
+  }
+
   bool exhausted() const { return damping_.lambda >= kLargestDamping || radius_ <= kLeastRadius; }
 
  private:

@@ -39,6 +39,20 @@ class Loop {
         control_(options.trust_region,
                  options.initial_damping > 0 ? options.initial_damping : default_damping(1)) {}
 
+  /// Goes on from what is there, and leaves what there is after each step.
+  void keep(std::optional<LoopHistory>* history) {
+    history_ = history;
+    if (history == nullptr || !*history) return;
+    const LoopHistory& from = **history;
+    control_.restore(from.control);
+    forcing_ = from.forcing;
+    precise_ = from.precise;
+    small_decreases_ = from.small_decreases;
+    cost_ = from.cost;
+    plain_cost_ = from.plain_cost;
+    begun_ = true;
+  }
+
   void run() {
     while (!done_) {
       const Step step = system_.propose({control_.damping(), forcing_, loss_, &cancelled_, precise_,
@@ -180,6 +194,8 @@ class Loop {
   void publish(Iteration it) {
     it.time_s = since_begin_.seconds();
     summary_.iterations.push_back(it);
+    if (history_ != nullptr)
+      *history_ = {control_.state(), cost_, plain_cost_, forcing_, precise_, small_decreases_};
     if (options_.on_iteration && !options_.on_iteration(it))
       end(Termination::stopped, "stopped by the caller; the best state so far is kept");
   }
@@ -198,6 +214,7 @@ class Loop {
   const Stopwatch since_begin_;
   Summary& summary_;
   const double settled_motion_px_;
+  std::optional<LoopHistory>* history_ = nullptr;
   StepControl control_;
   /// An iterative solver solves loosely at first and tighter as the cost settles.
   double forcing_ = kLoosestForcing;
@@ -218,8 +235,11 @@ double default_damping(std::size_t images) {
 }
 
 void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
-              const Stopwatch& since_start, Summary& summary, double settled_motion_px) {
-  Loop(system, loss, options, since_start, summary, settled_motion_px).run();
+              const Stopwatch& since_start, Summary& summary, double settled_motion_px,
+              std::optional<LoopHistory>* history) {
+  Loop loop(system, loss, options, since_start, summary, settled_motion_px);
+  loop.keep(history);
+  loop.run();
 }
 
 }  // namespace sheaf

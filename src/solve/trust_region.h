@@ -4,10 +4,12 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "platform/clock.h"
 #include "sheaf/options.h"
 #include "sheaf/solve.h"
+#include "solve/step_control.h"
 #include "systems/system.h"
 
 namespace sheaf {
@@ -19,14 +21,27 @@ namespace sheaf {
 /// some hundred images pay a step for it.
 double default_damping(std::size_t images);
 
+/// What the loop itself keeps from step to step, and what the held state costs.
+struct LoopHistory {
+  StepControl::State control;
+  double cost = 0, plain_cost = 0;
+  double forcing = 0;
+  bool precise = false;
+  int small_decreases = 0;
+};
+
 /// Levenberg-Marquardt or a dogleg, with gain-ratio control, on any System, with one loss. Adds to
 /// the summary's iterations, and sets costs, termination and words; the best state is the system's
 /// held one.
 /// An infinite tolerance ends it after one accepted step; steps whose median motion is above
 /// settled_motion_px never end it.
 /// `since_start` runs since set-up began (the time limit counts from there).
+/// `history`: what an earlier call left there is gone on from, and this one leaves its own after
+/// every step, before on_iteration is called. With Home::history and the state of that moment, the
+/// steps are those of a run that was never stopped.
 void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
               const Stopwatch& since_start, Summary& summary,
-              double settled_motion_px = std::numeric_limits<double>::infinity());
+              double settled_motion_px = std::numeric_limits<double>::infinity(),
+              std::optional<LoopHistory>* history = nullptr);
 
 }  // namespace sheaf

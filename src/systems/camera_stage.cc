@@ -70,6 +70,18 @@ void CameraStage::moved(double cost) {
   if (coarse_) coarse_->moved(cost);
 }
 
+CameraStage::History CameraStage::history() const {
+  History out;
+  out.modes = solver_->history();
+  if (coarse_) out.coarse = coarse_->history();
+  return out;
+}
+
+void CameraStage::restore(const History& history) {
+  solver_->restore(history.modes);
+  if (coarse_ && history.coarse) coarse_->restore(*history.coarse);
+}
+
 double CameraStage::add_decrease(double sum) const {
   for (std::int32_t c = 0; c < columns_.count; ++c)
     sum += step_[c] * (vectors_.rhs[c] + damping_[c] * step_[c]);

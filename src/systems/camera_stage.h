@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "lists/columns.h"
 #include "platform/buffer.h"
@@ -35,6 +36,15 @@ class CameraStage {
   bool shorten(const ReducedSums& sums, const StepRequest& request);
   /// The stepped state, of this cost, becomes the held one.
   void moved(double cost);
+
+  /// What one step leaves to the next.
+  struct History {
+    RecycledModes::History modes;
+    std::optional<CoarseSpace::History> coarse;
+  };
+  History history() const;
+  /// Of a stage of the same columns and solver.
+  void restore(const History& history);
 
   // Sums over the columns that go on from what the points' parts came to.
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "systems/camera_stage.h"
 #include "systems/camera_state.h"
 #include "systems/system.h"
 
@@ -17,6 +18,10 @@ class Home : public System {
   virtual const CameraState& cameras() const = 0;
   /// Writes the held points, 3 numbers for each; those that nothing sees are not touched.
   virtual void store_points(std::vector<double>& points) const = 0;
+  /// What one step leaves to the next beside the state: with both, and what the loop keeps
+  /// (solve/trust_region.h), another home of the same problem and options goes on to the same bits.
+  virtual CameraStage::History history() const = 0;
+  virtual void restore(const CameraStage::History& history) = 0;
   /// Observations behind their camera at the held state, or as many as there may be.
   virtual std::uint64_t count_behind() = 0;
   /// What it holds beside its arrangement.

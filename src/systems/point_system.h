@@ -52,6 +52,8 @@ class PointSystem : public Home {
   Trial trial() override;
   void accept() override;
   double residual_scale(double quantile) override;
+  CameraStage::History history() const override { return stage_.history(); }
+  void restore(const CameraStage::History& history) override { stage_.restore(history); }
   const CameraState& cameras() const override { return state_.held.cameras; }
   void store_points(std::vector<double>& points) const override;
   std::uint64_t count_behind() override { return rows_->count_behind(); }
