@@ -17,7 +17,8 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
-#include "eliminate/eliminate-inl.h"
+#include "eliminate/point_pass-inl.h"
+#include "rows/bal_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {

@@ -11,28 +11,22 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "eliminate/bal_source-inl.h"
 #include "eliminate/coarse-inl.h"
-#include "eliminate/eliminate-inl.h"
 #include "eliminate/float_product-inl.h"
+#include "eliminate/point_trial-inl.h"
 #include "eliminate/products-inl.h"
 #include "eliminate/schur_product-inl.h"
-#include "eliminate/trial-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-// Each is compiled with and without a loss, and with and without charts of the points, so that a
-// problem that has none pays nothing for those that do.
 void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
                EliminateOutput& out) {
-  const bool robust = in.loss.kind != LossKind::none;
-  if (in.chart.base == ChartBase::none)
-    robust ? linearize_chunk<true, false>(in, chunk, records, out)
-           : linearize_chunk<false, false>(in, chunk, records, out);
-  else
-    robust ? linearize_chunk<true, true>(in, chunk, records, out)
-           : linearize_chunk<false, true>(in, chunk, records, out);
+  eliminate_points<BalSource>(
+      {{in.batches, in.cameras, in.points}, {in.damping, in.points_held, in.loss, in.chart}}, chunk,
+      records, out);
 }
 
 void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
@@ -50,11 +44,13 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  const bool robust = in.loss.kind != LossKind::none;
-  if (in.chart.base == ChartBase::none)
-    robust ? trial_chunk<true, false>(in, chunk, out) : trial_chunk<false, false>(in, chunk, out);
-  else
-    robust ? trial_chunk<true, true>(in, chunk, out) : trial_chunk<false, true>(in, chunk, out);
+  try_points<BalSource>(
+      {{in.batches, in.cameras, in.points},
+       {in.batches, in.trial_cameras, nullptr},
+       in.factors,
+       in.weights,
+       {in.count_newly_behind, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend}},
+      chunk, out);
 }
 
 void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {
@@ -66,7 +62,7 @@ void product(const ProductInput& in, const Chunk& chunk, double* saved, double* 
 
 void residuals(const Batches& batches, const double* cameras, const double* points,
                const Chunk& chunk, double* out) {
-  residuals_chunk(batches, cameras, points, chunk, out);
+  residuals_of<BalSource>({&batches, cameras, points}, chunk, out);
 }
 
 void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved, double* y) {
@@ -78,12 +74,41 @@ void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved
 
 double square_sum(const Batches& batches, const double* cameras, const double* points,
                   const Chunk& chunk) {
-  return square_sum_chunk(batches, cameras, points, chunk);
+  const BalState at{&batches, cameras, points};
+  V sums[kParts];
+  for (V& s : sums) s = zero();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (int p = 0; p < kParts; ++p) {
+      const GroupPart of(at.batches->groups[g], g, p);
+      V X[3], square = zero();
+      of.load_points(at.points, X);
+      for (std::uint64_t b = of.first_batch; b < of.first_batch + of.track; ++b) {
+        const LaneJacobian j = BalSource::evaluate<false>(at, of, b, X);
+        square = hn::Add(square, fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
+      }
+      if (!of.full()) square = hn::Mul(square, of.mask());
+      sums[p] = hn::Add(sums[p], square);
+    }
+  return sum_parts(sums);
 }
 
 std::uint64_t count_behind(const Batches& batches, const double* cameras, const double* points,
                            const Chunk& chunk) {
-  return count_behind_chunk(batches, cameras, points, chunk);
+  const BalState at{&batches, cameras, points};
+  V sums[kParts];
+  for (V& s : sums) s = zero();
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (int p = 0; p < kParts; ++p) {
+      const GroupPart of(at.batches->groups[g], g, p);
+      V X[3];
+      of.load_points(at.points, X);
+      const V one = of.mask();
+      for (std::uint64_t b = of.first_batch; b < of.first_batch + of.track; ++b) {
+        const auto behind = hn::Gt(BalSource::depth(at, of, b, X), zero());
+        sums[p] = hn::Add(sums[p], hn::IfThenElseZero(behind, one));
+      }
+    }
+  return static_cast<std::uint64_t>(sum_parts(sums));
 }
 
 constexpr Kernels table() {

@@ -14,10 +14,10 @@
 #include <hwy/highway.h>
 
 #include "eliminate/lens_dogleg-inl.h"
-#include "eliminate/lens_eliminate-inl.h"
 #include "eliminate/lens_product-inl.h"
 #include "eliminate/lens_products-inl.h"
-#include "eliminate/lens_trial-inl.h"
+#include "eliminate/lens_source-inl.h"
+#include "eliminate/point_trial-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -25,10 +25,8 @@ namespace HWY_NAMESPACE {
 
 void linearize_lenses(const LensEliminateInput& in, const Chunk& chunk, const LensRecords& records,
                       EliminateOutput& out) {
-  if (in.loss.kind == LossKind::none)
-    eliminate_lens_chunk<false>(in, chunk, records, out);
-  else
-    eliminate_lens_chunk<true>(in, chunk, records, out);
+  eliminate_points<LensSource>({in.of, {in.damping, in.points_held, in.loss, in.chart}}, chunk,
+                               records, out);
 }
 
 void multiply_lenses(const LensTracks& tracks, const LensTiles& tiles_of, const Chunks& chunks,
@@ -43,10 +41,13 @@ void multiply_poses(const Chunks& chunks, const Chunk& chunk, const Records& rec
 }
 
 void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  if (in.loss.kind == LossKind::none)
-    lens_trial_chunk<false>(in, chunk, out);
-  else
-    lens_trial_chunk<true>(in, chunk, out);
+  try_points<LensSource>(
+      {{in.batches, in.tracks, in.held},
+       {in.batches, in.tracks, in.tried},
+       in.factors,
+       in.weights,
+       {false, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend}},
+      chunk, out);
 }
 
 void multiply_by_lenses(const LensProductInput& in, const Chunk& chunk, double* saved, double* y) {
@@ -54,23 +55,6 @@ void multiply_by_lenses(const LensProductInput& in, const Chunk& chunk, double* 
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
     prefetch_groups(in.of.at.points, in.factors, 6, g + 1, std::min<std::size_t>(g + 2, groups));
     lens_product_group(in, g, saved, y);
-  }
-}
-
-void lens_residuals(const LensInput& in, const Chunk& chunk, double* out) {
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
-    const Batches::Group& group = in.batches->groups[g];
-    for (int lane = 0; lane < 8; lane += kLanes) {
-      const double* from = in.at.points + kPointGroup * g + lane;
-      const V X[3] = {load(from), load(from + 8), load(from + 16)};
-      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-        LensView s;
-        look<Wanted::pixel, false>(*in.batches, *in.tracks, in.at, b, lane, X, s);
-        for (int r = 0; r < 2; ++r)
-          store(hn::Abs(hn::Sub(s.J.pixel[r].v, load(&in.batches->xy[16 * b + 8 * r + lane]))),
-                out + 16 * (b - chunk.first_batch) + 8 * r + lane);
-      }
-    }
   }
 }
 
@@ -93,9 +77,10 @@ void keep_lens_rows(const LensProductInput& in, double unit, const Chunk& chunk,
 }
 
 constexpr LensKernels lens_table() {
-  return {set_name(HWY_TARGET), &linearize_lenses,       &multiply_lenses, &multiply_poses,
-          &try_lenses,          &multiply_by_lenses,     &lens_residuals,  &sum_lens_gradient,
-          &sum_lens_curvature,  &sum_lens_point_damping, &keep_lens_rows};
+  return {set_name(HWY_TARGET),      &linearize_lenses,  &multiply_lenses,
+          &multiply_poses,           &try_lenses,        &multiply_by_lenses,
+          &residuals_of<LensSource>, &sum_lens_gradient, &sum_lens_curvature,
+          &sum_lens_point_damping,   &keep_lens_rows};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -28,6 +28,7 @@ struct LensEliminateInput {
   double damping;
   bool points_held;
   ScaledLoss loss{};
+  ChartRules chart{};
 };
 
 /// Records of one chunk. Those of observations are as elimination of any rows leaves them; the T
@@ -67,6 +68,8 @@ struct LensTrialInput {
   double mean_square;
   ScaledLoss loss{};
   const double* weights = nullptr;
+  ChartRules chart{};  ///< as in elimination; ChartBase::none where points are held
+  PointBlend blend{};
 };
 
 /// x: kProductRecord doubles for each block of an image or a lens, nine of them used.

@@ -10,7 +10,7 @@
 #define SHEAF_LINEAR_LENS_PRODUCT_INL_H_
 #endif
 
-#include "eliminate/lens_eliminate-inl.h"
+#include "eliminate/lens_source-inl.h"
 #include "eliminate/schur_product-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -9,9 +9,9 @@
 #define SHEAF_LINEAR_POINT_CHART_INL_H_
 #endif
 
-#include "eliminate/kernels.h"
 #include "geometry/point_chart.h"
-#include "rows/bal_lanes-inl.h"
+#include "lists/batches.h"
+#include "rows/rows-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {

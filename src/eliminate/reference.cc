@@ -67,17 +67,7 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
       }
   }
   const PointCoordinates at(in.chart, base_of(in.chart, *in.batches, group, lane, in.cameras), X);
-  const Vector3<double> V = at.diagonal(A);
-  Vector3<double> D;
-  for (int i = 0; i < 3; ++i)
-    D[i] = in.damping * std::clamp(V[i], kDiagonalFloor, kDiagonalCeiling);
-  if (!at.plain()) {
-    const double least = in.chart.rounding * in.chart.unit;
-    D[2] = std::max(D[2], least * least * at.chart.reach2 * (V[0] + V[1]));
-    const bool far = !in.chart.crosses && at.chart.reach * in.chart.unit > kBound;
-    if (far && at.chart.transpose(gradient)[2] > 0)
-      D[2] = std::max(D[2], kAtBound * std::clamp(V[2], kDiagonalFloor, kDiagonalCeiling));
-  }
+  const Vector3<double> D = at.damping(A, gradient, in.damping);
   at.damp(D, 1, A);
   Factor3 f = Factor3::of(A);
   f.held = in.points_held;

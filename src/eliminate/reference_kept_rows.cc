@@ -56,7 +56,8 @@ void eliminate_point(const StoredRowsInput& in, const Chunk& chunk, std::size_t 
     rows.push_back(kept_row(in.rows, g, b, lane));
     normal.add(rows.back());
   }
-  const EliminatedPoint p(normal, in.damping, in.points_held);
+  const ChartRules none{};
+  const EliminatedPoint p(normal, {none, {}, {}}, in.damping, in.points_held);
   out.point_decrease += p.decrease();
   out.gradient_max2 = std::max(out.gradient_max2, p.decrease());
   p.store(out.factors + kFactorGroup * g + lane);

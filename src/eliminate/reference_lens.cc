@@ -155,7 +155,10 @@ void eliminate_point(const LensEliminateInput& in, const Chunk& chunk, std::size
   const PointTrack track = look_at_point(in, g, lane, out);
   PointNormal normal;
   for (const LensRow& row : track.rows) normal.add(row);
-  const EliminatedPoint p(normal, in.damping, in.points_held);
+  const Batches& batches = *in.of.batches;
+  const Vector3<double> base = base_of(in.chart, batches, batches.groups[g], lane, in.of.at.images);
+  const PointCoordinates at(in.chart, base, point_of(in.of.at.points, g, lane));
+  const EliminatedPoint p(normal, at, in.damping, in.points_held);
   out.point_decrease += p.decrease();
   out.gradient_max2 = std::max(out.gradient_max2, p.decrease());
   p.store(out.factors + kFactorGroup * g + lane);

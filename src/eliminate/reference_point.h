@@ -29,18 +29,16 @@ struct PointNormal {
   }
 };
 
-/// V + D = L L^T with D = lambda diag(V), clamped, and w = L^-1 g; a point that is held has
-/// L^-1 = 0 and D = 0.
+/// V + D = L L^T by X, Y and Z, w = L^-1 g; a point that is held has L^-1 = 0.
 struct EliminatedPoint {
   Factor3 f;
   Vector3<double> w{}, D{};
 
-  EliminatedPoint(const PointNormal& p, double lambda, bool held) {
+  /// at: the point's coordinates, whose D it is.
+  EliminatedPoint(const PointNormal& p, const PointCoordinates& at, double lambda, bool held)
+      : D(at.damping(p.V, p.g, lambda)) {
     Matrix3<double> A = p.V;
-    for (std::size_t i = 0; i < 3; ++i) {
-      D[i] = held ? 0 : lambda * std::clamp(p.V[4 * i], kDiagonalFloor, kDiagonalCeiling);
-      A[4 * i] += D[i];
-    }
+    at.damp(D, 1, A);
     if (!held) f = Factor3::of(A);
     f.held = held;
     w = f.forward(p.g.data());
@@ -85,6 +83,12 @@ struct WhitenedRow {
     return {first, (q[1] - l10 * first) / l11};
   }
 };
+
+/// s += Jp^T w e.
+inline void add_to_point(const PointRow& row, double w, const std::array<double, 2>& e,
+                         Vector3<double>& s) {
+  for (std::size_t i = 0; i < 3; ++i) s[i] += w * (row.point[0][i] * e[0] + row.point[1][i] * e[1]);
+}
 
 /// T = Jc^T B, C = Lm^T Jc and h, as records have them.
 inline void write_point_records(const PointRow& row, const WhitenedRow& m, double* T, double* C) {

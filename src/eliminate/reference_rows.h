@@ -139,6 +139,21 @@ struct PointCoordinates {
     }
     return out;
   }
+  /// Marquardt's, of the coordinates: lambda diag(E^T V E), clamped; more where rounding would pass
+  /// for parallax, and where the point is at its bound (ChartRules).
+  Vector3<double> damping(const Matrix3<double>& V, const Vector3<double>& gradient,
+                          double lambda) const {
+    const Vector3<double> v = diagonal(V);
+    Vector3<double> D;
+    for (std::size_t i = 0; i < 3; ++i)
+      D[i] = lambda * std::clamp(v[i], kDiagonalFloor, kDiagonalCeiling);
+    if (plain()) return D;
+    const double least = rules.rounding * rules.unit;
+    D[2] = std::max(D[2], least * least * chart.reach2 * (v[0] + v[1]));
+    if (!rules.crosses && chart.reach * rules.unit > kBound && chart.transpose(gradient)[2] > 0)
+      D[2] = std::max(D[2], kAtBound * std::clamp(v[2], kDiagonalFloor, kDiagonalCeiling));
+    return D;
+  }
   /// A += E^-T D E^-1.
   void damp(const Vector3<double>& D, double by, Matrix3<double>& A) const {
     Vector3<double> column[3];

@@ -10,7 +10,9 @@
 #define SHEAF_LINEAR_SCHUR_PRODUCT_INL_H_
 #endif
 
-#include "eliminate/trial-inl.h"
+#include <algorithm>
+
+#include "eliminate/bal_source-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {

@@ -53,13 +53,6 @@ bool lends_observations(const Problem& problem, const Batches& batches, const So
          LentObservations::possible(problem, batches, threads);
 }
 
-Error refused(const char* what) {
-  return Error(ErrorCode::usage,
-               std::string(what) +
-                   " is for BAL, SIMPLE_PINHOLE, SIMPLE_RADIAL and RADIAL cameras with their "
-                   "principal points held");
-}
-
 }  // namespace
 
 Result<const Kernels*> choose_kernels(Simd simd) {
@@ -134,9 +127,6 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
 }
 
 Result<void> Build::plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  if (options_->trust_region == TrustRegion::dogleg) return refused("the dogleg");
-  if (options_->points != PointParametrisation::xyz)
-    return refused("a parametrisation of points other than X, Y, Z");
   Result<Arrangement> arranged = arrange_with_lenses(problem, options_->fixed, skip, *threads_);
   if (!arranged.ok()) return arranged.error();
   arranged_ = std::make_unique<Arrangement>(std::move(arranged).value());

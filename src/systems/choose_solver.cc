@@ -128,6 +128,7 @@ Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOpt
   Clusters clusters;
   WorkCounts counts = estimate_lens_work(arranged, held, clusters, threads);
   counts.weighted = options.loss.kind != LossKind::none;
+  counts.dogleg = options.trust_region == TrustRegion::dogleg;
   const Batches& batches = arranged.batches;
   const LensTracks& tracks = arranged.tracks;
   SolveOptions implicit = options;

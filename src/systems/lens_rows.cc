@@ -176,7 +176,7 @@ LensInput LensRows::held_input() const {
 
 Records LensRows::eliminate(const Elimination& of, std::uint32_t c, double* scratch, double* tiles,
                             double* diagonal, EliminateOutput& out) {
-  const LensEliminateInput in{held_input(), of.damping, of.points_held, of.loss};
+  const LensEliminateInput in{held_input(), of.damping, of.points_held, of.loss, of.chart};
   const LensChunks& lists = arranged_.lists;
   const Chunk& chunk = chunks_.chunks[c];
   const LensRecords records = layout_.in(scratch);
@@ -211,7 +211,9 @@ void LensRows::trial(const PointTrial& of, std::uint32_t chunk, TrialOutput& out
                           of.inner_iterations,
                           of.mean_square,
                           of.loss,
-                          state_->weights.data()};
+                          state_->weights.data(),
+                          of.chart,
+                          of.blend};
   lens_kernels_.trial(in, chunks_.chunks[chunk], out);
 }
 

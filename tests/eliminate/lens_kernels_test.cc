@@ -43,6 +43,8 @@ struct Settings {
   bool points_held = false;
   int inner_iterations = 3;
   double mean_square = 1e-2;  ///< px^2: every point has something to gain
+  ChartRules chart{};
+  PointBlend blend{};
 };
 
 /// Everything that the kernels produce from one state.
@@ -132,7 +134,8 @@ void LensProblem::eliminate(const LensKernels& kernels, Outcome& out) const {
   Buffer<double> scratch(layout_.doubles);
   scratch.fill(std::nan(""));  // what was there before must not matter
   const LensRecords records = layout_.in(scratch.data());
-  const LensEliminateInput in{input(), settings_.damping, settings_.points_held, settings_.loss};
+  const LensEliminateInput in{input(), settings_.damping, settings_.points_held, settings_.loss,
+                              settings_.chart};
   const bool poses_alone = std::all_of(tracks.lenses.begin(), tracks.lenses.end(),
                                        [](const LensPlaces& lens) { return lens.riders == 0; });
   for (std::size_t c = 0; c < chunks_.chunks.chunks.size(); ++c) {
@@ -196,7 +199,9 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
                              settings_.points_held ? 0 : settings_.inner_iterations,
                              settings_.mean_square,
                              settings_.loss,
-                             out.weights.data()};
+                             out.weights.data(),
+                             settings_.chart,
+                             settings_.blend};
   for (const Chunk& chunk : chunks_.chunks.chunks) {
     kernels.trial(trial, chunk, out.trial);
     kernels.residuals(input(), chunk, &out.residuals[16 * chunk.first_batch]);
@@ -329,6 +334,34 @@ TEST(LensKernels, BlocksSummedAtOnceAreEquivalentToReference) {
       ASSERT_TRUE(LensProblem(problem, {}, settings).sums_at_once());
       expect_equivalence(problem, {}, settings);
       expect_equivalence(problem, nothing_held(problem), settings);
+    }
+}
+
+/// About another place and in another unit than the scene's; of points that are near.
+TEST(LensKernels, ChartsAreEquivalentToReference) {
+  for (const Problem& problem : mixtures())
+    for (ChartBase base : {ChartBase::origin, ChartBase::host})
+      for (bool crosses : {true, false})
+        for (LossKind loss : {LossKind::none, LossKind::huber}) {
+          SCOPED_TRACE(base == ChartBase::host ? "host" : "origin");
+          Settings settings;
+          settings.loss = {loss, 1.0};
+          settings.chart = {base, {0.1, -0.2, 0.3}, 0.5, crosses, 1e-12};
+          for (int most : {0, 3}) {
+            settings.inner_iterations = most;
+            expect_equivalence(problem, nothing_held(problem), settings, 100);
+          }
+        }
+}
+
+/// The steps that a dogleg tries: of Newton's and of steepest descent's.
+TEST(LensKernels, BlendedStepsAreEquivalentToReference) {
+  for (const Problem& problem : mixtures())
+    for (LossKind loss : {LossKind::none, LossKind::cauchy}) {
+      Settings settings;
+      settings.loss = {loss, 1.0};
+      settings.blend = {0.6, 0.2 * settings.damping, 2};
+      expect_equivalence(problem, {}, settings);
     }
 }
 

@@ -1,0 +1,159 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+// The point pass: elimination of a chunk's points, and their back-substitution fused with the cost
+// at the stepped state. It is one for all rows; where these come from is its Source: BalSource,
+// LensSource, or rows that are kept (row_source-inl.h). A source has
+//   rows(batch, mask, room)        residuals and Jacobians at the held state, of a part's lanes
+//   keep(rows, o, room), stride()  where they wait until the points are factored
+//   write(factor, w, rows, to)     their records
+//   couple(batch, weights, s)      s += Jp^T w Jc dc
+// and, where it can tell the residuals of any state (kEvaluates), evaluate(state, part, batch, Y).
+#if defined(SHEAF_ELIMINATE_POINT_PASS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHEAF_ELIMINATE_POINT_PASS_INL_H_
+#undef SHEAF_ELIMINATE_POINT_PASS_INL_H_
+#else
+#define SHEAF_ELIMINATE_POINT_PASS_INL_H_
+#endif
+
+#include <algorithm>
+
+#include "eliminate/factor-inl.h"
+#include "eliminate/group_part-inl.h"
+#include "eliminate/records-inl.h"
+#include "rows/loss_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sheaf {
+namespace HWY_NAMESPACE {
+
+/// A state as a source reads it, and what happens to its points.
+template <class State>
+struct EliminationOf {
+  State of;
+  PassElimination how;
+};
+
+struct EliminateSums {
+  V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
+};
+
+/// The rows of a loss: sqrt(rho') times those of the residual.
+HWY_INLINE Rho apply_loss(const ScaledLoss& loss, LaneJacobian& j) {
+  const Rho rho = rho_lanes(LossLanes(loss), fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
+  scale_rows(hn::Sqrt(rho.weight), j);
+  return rho;
+}
+
+/// The base of a part's points at a state.
+template <class Source>
+HWY_INLINE void base_of(const ChartRules& rules, const typename Source::State& at,
+                        const GroupPart& of, V* base) {
+  load_base(rules, *at.batches, of.first_batch, of.lane(), Source::images(at), base);
+}
+
+/// Factors the points of a part, whose normal equations are p by their chart's coordinates.
+template <bool kCharted>
+HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
+                            [[maybe_unused]] const LaneChart& chart, const GroupPart& of,
+                            double* factors, EliminateSums& sums, Factor& f, V* w) {
+  DampedFactor damped;
+  damped.compute<kCharted>(how, p, chart);
+  f = damped.f;
+  forward(f, p.g, w);
+  const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
+  sums.decrease[of.part] = hn::Add(sums.decrease[of.part], w2);
+  sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], w2);
+  double* out = factors + kFactorGroup * of.group + of.lane();
+  Factor x = f;
+  V y[3] = {w[0], w[1], w[2]};
+  if constexpr (kCharted) factor_by_xyz(chart, f, w, x, y);
+  const V all[factor_group::kFields] = {x.i00, x.l10, x.l20, x.i11,       x.l21,       x.i22,
+                                        y[0],  y[1],  y[2],  damped.D[0], damped.D[1], damped.D[2]};
+  for (int i = 0; i < factor_group::kFields; ++i) store(all[i], out + 8 * i);
+}
+
+template <class Source, bool kRobust, bool kCharted, class GroupRecords>
+HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, const GroupPart& of,
+                               const GroupRecords& to, const EliminateOutput& out,
+                               EliminateSums& sums) {
+  V X[3];
+  if constexpr (Source::kEvaluates) of.load_points(Source::points(in.of), X);
+  const Source source{in.of, of, X};
+  const V mask = of.mask();
+  const V* scale = of.full() ? nullptr : &mask;
+  [[maybe_unused]] LaneChart chart;
+  if constexpr (kCharted) {
+    V base[3];
+    base_of<Source>(in.how.chart, in.of, of, base);
+    chart.place(in.how.chart, X[0], X[1], X[2], base);
+  }
+  PointSums p;
+  p.clear();
+  V square = sums.square[of.part], robust = sums.loss[of.part];
+  const double* rows = nullptr;
+  double* const room = Source::room(to);
+  for (std::uint32_t o = 0; o < of.track; ++o) {
+    const std::uint64_t b = of.first_batch + o;
+    LaneJacobian j = source.rows(b, scale, room + source.stride() * o);
+    if constexpr (Source::kEvaluates) square = Source::add_square(j, square);
+    if constexpr (kRobust) {
+      const Rho rho = apply_loss(in.how.loss, j);
+      if constexpr (Source::kMostBlocks > 0)
+        source.scale_others(hn::Sqrt(rho.weight), room + source.stride() * o);
+      robust = hn::Add(robust, rho.value);
+      store(rho.weight, out.weights + 8 * b + of.lane());
+    }
+    if constexpr (kCharted)
+      for (V* row : {j.point[0], j.point[1]}) chart.transpose(row);
+    p.add(j);
+    rows = source.keep(j, o, room);
+  }
+  sums.square[of.part] = square;
+  sums.loss[of.part] = robust;
+  Factor f;
+  V w[3];
+  factor_part<kCharted>(in.how, p, chart, of, out.factors, sums, f, w);
+  source.write(f, w, rows, to);
+}
+
+template <class Source, bool kRobust, bool kCharted>
+inline void eliminate_chunk(const EliminationOf<typename Source::State>& in, const Chunk& chunk,
+                            const typename Source::KeptRecords& records, EliminateOutput& out) {
+  EliminateSums sums;
+  for (int p = 0; p < kParts; ++p)
+    sums.square[p] = sums.loss[p] = sums.decrease[p] = sums.gradient2[p] = zero();
+  Source::begin_chunk(in.of, records);
+  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
+    if (g + 1 < chunk.end_group) Source::prefetch(in.of, in.of.batches->groups[g + 1]);
+    const auto to = Source::of_group(in.of, chunk, g, records);
+    for (int p = 0; p < kParts; ++p)
+      eliminate_part<Source, kRobust, kCharted>(in, {in.of.batches->groups[g], g, p}, to, out,
+                                                sums);
+  }
+  out.square_sum += sum_parts(sums.square);
+  if (kRobust) out.loss_sum += sum_parts(sums.loss);
+  out.point_decrease += sum_parts(sums.decrease);
+  const double gradient2 = max_parts(sums.gradient2);
+  out.gradient_max2 = gradient2 > out.gradient_max2 ? gradient2 : out.gradient_max2;
+}
+
+/// Compiled with and without a loss, and with and without charts of the points, so that a problem
+/// that has none pays nothing for those that do.
+template <class Source>
+inline void eliminate_points(const EliminationOf<typename Source::State>& in, const Chunk& chunk,
+                             const typename Source::KeptRecords& records, EliminateOutput& out) {
+  const bool robust = in.how.loss.kind != LossKind::none;
+  if (in.how.chart.base == ChartBase::none)
+    (robust ? eliminate_chunk<Source, true, false>
+            : eliminate_chunk<Source, false, false>)(in, chunk, records, out);
+  else
+    (robust ? eliminate_chunk<Source, true, true>
+            : eliminate_chunk<Source, false, true>)(in, chunk, records, out);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sheaf
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard
