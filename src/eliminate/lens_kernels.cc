@@ -91,31 +91,30 @@ HWY_AFTER_NAMESPACE();
 namespace sheaf {
 namespace {
 
-std::uint64_t most_slots(const LensTracks& tracks, const Chunks& chunks) {
-  std::uint64_t most = 0;
+LensSizes sizes_of(const LensTracks& tracks, const Chunks& chunks, bool only_diagonal) {
+  LensSizes out{chunks.most_batches, 0, most_group_slots(tracks), only_diagonal};
   for (const Chunk& chunk : chunks.chunks)
-    most = std::max(most, slots_before(tracks, chunk, chunk.end_group));
-  return most;
+    out.slots = std::max<std::size_t>(out.slots, slots_before(tracks, chunk, chunk.end_group));
+  return out;
 }
 
 }  // namespace
 
 LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
-                         const LensTiles& tiles) {
+                         const LensTiles& tiles)
+    : LensScratch(batches, tracks, sizes_of(tracks, chunks, tiles.of_image.empty())) {}
+
+LensScratch::LensScratch(const Batches& batches, const LensTracks& tracks, const LensSizes& sizes) {
   // More blocks than these are not cleared and flushed for every chunk.
   constexpr std::size_t kFewBlocks = 8;
   const std::size_t all_blocks = lens_blocks(tracks);
-  const bool sums = tiles.of_image.empty() && all_blocks > 0 && all_blocks <= kFewBlocks;
-  const std::size_t observations = 8 * chunks.most_batches;
-  const auto row_blocks = static_cast<std::size_t>(tracks.most_blocks);
-  const std::size_t recorded = sums ? 0 : row_blocks;
-  std::size_t rows = 0;
-  for (std::size_t g = 0; g < batches.groups.size(); ++g)
-    rows = std::max<std::size_t>(rows, tracks.slots_of(g));
-  C = kTRecord * (observations + (sums ? 0 : 8 * most_slots(tracks, chunks)));
+  const bool sums = sizes.only_diagonal && all_blocks > 0 && all_blocks <= kFewBlocks;
+  const std::size_t observations = 8 * sizes.batches;
+  const std::size_t recorded = sums ? 0 : static_cast<std::size_t>(tracks.most_blocks);
+  C = kTRecord * (observations + (sums ? 0 : 8 * sizes.slots));
   lens = C + kCRecord * observations;
   slots = lens + kLensPairRecord * recorded * observations;
-  blocks = slots + kSlotSums * (rows + 1);
+  blocks = slots + kSlotSums * (sizes.group_slots + 1);
   jacobians = blocks + (sums ? kBlockSums * (all_blocks + 1) : 0);
   doubles = jacobians + product_scratch_doubles(batches, tracks);
 }

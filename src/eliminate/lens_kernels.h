@@ -45,10 +45,18 @@ struct LensRecords {
   double* slots;   ///< of one group's sums T_l
   double* blocks;  ///< kBlockSums per block of a lens and one more; nullptr: not so summed
 };
+/// What the size of a chunk's records depends on.
+struct LensSizes {
+  std::size_t batches;      ///< of any chunk, at most
+  std::size_t slots;        ///< rows of slots of any chunk, at most
+  std::size_t group_slots;  ///< rows of slots of any group, at most
+  bool only_diagonal;       ///< nothing but the lenses' diagonal blocks is wanted of them
+};
 /// The records laid out for any of these chunks in one thread's scratch.
 struct LensScratch {
   std::size_t C, lens, slots, blocks, jacobians, doubles;  ///< from the start, T's; in all
 
+  LensScratch(const Batches& batches, const LensTracks& tracks, const LensSizes& sizes);
   LensScratch(const Batches& batches, const LensTracks& tracks, const Chunks& chunks,
               const LensTiles& tiles);
   LensRecords in(double* scratch) const {

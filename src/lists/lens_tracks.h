@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -56,6 +57,14 @@ struct LensTracks {
     return static_cast<std::uint32_t>(first_slot[group + 1] - first_slot[group]);
   }
 };
+
+/// Rows of slots of any group, at most.
+inline std::uint32_t most_group_slots(const LensTracks& tracks) {
+  std::uint32_t most = 0;
+  for (std::size_t g = 0; g + 1 < tracks.first_slot.size(); ++g)
+    most = std::max(most, tracks.slots_of(g));
+  return most;
+}
 
 /// Blocks of lenses' own.
 inline std::size_t lens_blocks(const LensTracks& tracks) {

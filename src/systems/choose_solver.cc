@@ -42,7 +42,7 @@ bool loses_parallax(SolverKind kind, PointParametrisation points) {
 
 bool takes_mixed(SolverKind kind, const WorkCounts& counts, const SolveOptions& options) {
   // Rows through lenses are kept for it: memory that is given where it is asked for.
-  if (counts.any_lens && kind == SolverKind::implicit_cg)
+  if (counts.lenses && kind == SolverKind::implicit_cg)
     return options.precision == Precision::mixed;
   switch (options.precision) {
     case Precision::full:
@@ -104,7 +104,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
   Plan leanest{SolverKind::implicit_cg, "",
-               !counts.any_lens && takes_mixed(SolverKind::implicit_cg, counts, options)};
+               !counts.lenses && takes_mixed(SolverKind::implicit_cg, counts, options)};
   const std::uint64_t lean = forecast(leanest);
   if (options.solver == CameraSolverKind::automatic && counts.images_couple &&
       !counts.only_formed && lean <= options.memory_limit_bytes) {
@@ -139,10 +139,9 @@ Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOpt
   if (held || asked_for(counts, options.solver).kind != SolverKind::implicit_cg) {
     out.chunks =
         cut_lens_chunks(batches, tracks, held ? LensLists::own_lens : LensLists::pairs, threads);
-    const std::uint64_t resident = resident_bytes() - listed_bytes(out.chunks);
     counts = count_lens_work(arranged, out.chunks, counts);
-    Result<Choice> formed =
-        choose_solver(counts, options, threads.count(), {resident, peak_resident_bytes()});
+    const MemoryHeld memory{resident_bytes(), peak_resident_bytes()};
+    Result<Choice> formed = choose_solver(counts, options, threads.count(), memory);
     if (formed.ok()) {
       out.choice = std::move(formed).value();
       out.choice.plan.clusters = std::move(clusters);

@@ -13,6 +13,7 @@
 #include "reduced/recycled_modes.h"
 #include "reduced/sparse_cholesky.h"
 #include "reduced/steihaug_path.h"
+#include "systems/camera_state.h"
 
 namespace sheaf {
 namespace {
@@ -36,31 +37,38 @@ class Footprint {
 std::uint64_t count_chunks(const WorkCounts& c) { return 1 + c.batches / Chunks::kBatchesPerChunk; }
 
 void add_lists(const WorkCounts& c, SolverKind kind, Footprint& sum) {
+  if (c.lenses && c.lenses->listed) return;
   sum.add(count_chunks(c), sizeof(Chunk));
-  if (kind == SolverKind::implicit_cg) return;
+  if (kind == SolverKind::implicit_cg && !c.lenses) return;
   sum.add(c.observations, sizeof(std::uint16_t));
   sum.add(std::min(c.observations, count_chunks(c) * c.images), sizeof(DiagonalRun));
-  if (kind == SolverKind::blocks) return;
+  if (kind == SolverKind::blocks || kind == SolverKind::implicit_cg) return;
   sum.add(c.pairs, sizeof(RecordPair));
   sum.add(c.pair_runs, sizeof(PairRun));
   sum.add(c.tiles, sizeof(Tile) + sizeof(std::uint32_t));
 }
 
 void add_state(const WorkCounts& c, Footprint& sum) {
-  constexpr std::uint64_t kPose = 56, kLens = 24;
-  sum.add(c.images, 2 * (kPose + kLens) + 4);
-  sum.add(c.images, 8 * kCameraRecord, 2);
+  const std::uint64_t images = c.lenses ? c.lenses->images : c.images;
+  const std::uint64_t lenses = c.lenses ? c.lenses->lenses : c.images;
+  sum.add(images, sizeof(RigidMotion<double>), 2);
+  sum.add(lenses, sizeof(CameraState::Parameters), 2);
+  sum.add(images, 8 * (c.lenses ? kImageRecord : kCameraRecord), 2);
+  if (c.lenses) sum.add(lenses, 8 * kLensRecord, 2);
   sum.add(c.groups, 8 * kPointGroup, 2);
   sum.add(c.groups, 8 * kFactorGroup);
   if (c.weighted) sum.add(c.batches, 64);
   sum.add(c.columns, 8, 4);  // right-hand side, squares, damping, step
 }
 
-void add_scratch(const WorkCounts& c, SolverKind kind, int threads, Footprint& sum) {
+/// Of threads that take slices.
+void add_scratch(const WorkCounts& c, SolverKind kind, std::uint64_t each, Footprint& sum) {
   const std::uint64_t track = c.longest_track, batches = std::max(Chunks::kBatchesPerChunk, track);
-  const auto each = static_cast<std::uint64_t>(threads);
-  sum.add(8 * std::min(batches, c.batches) * (kTRecord + kCRecord) + kRowBatch * track, 8, each);
-  if (kind == SolverKind::implicit_cg) sum.add(kProductScratch * track, 8, each);
+  const std::uint64_t bal =
+      8 * std::min(batches, c.batches) * (kTRecord + kCRecord) + kRowBatch * track;
+  sum.add(c.lenses ? c.lenses->scratch_doubles : bal, 8, each);
+  if (kind == SolverKind::implicit_cg)
+    sum.add(c.lenses ? c.lenses->product_doubles : kProductScratch * track, 8, each);
   if (c.clusters > 0) sum.add(kCoarseScratch * std::min(c.clusters, track), 8, each);
 }
 
@@ -79,7 +87,8 @@ void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, 
   }
   if (plan.kind == SolverKind::implicit_cg) {
     sum.add(slices * c.images, 8 * kProductRecord);
-    if (plan.mixed) sum.add(c.images, 4 * kFloatCameraRecord);
+    if (plan.mixed && !c.lenses) sum.add(c.images, 4 * kFloatCameraRecord);
+    if (plan.mixed && c.lenses) sum.add(8 * c.lenses->kept_fields * c.batches, 4);
   }
   if (c.clusters == 0) return;
   const std::uint64_t modes = kCoarseModes * c.clusters;
@@ -116,15 +125,17 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
   const SolverKind kind = plan.kind;
   const bool pairs = kind != SolverKind::blocks && kind != SolverKind::implicit_cg;
   const std::uint64_t tiles = pairs ? c.tiles : 0;
-  const auto slices = static_cast<std::uint64_t>(
-      count_slices(linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
+  const auto slices = c.lenses
+                          ? c.lenses->slices
+                          : static_cast<std::uint64_t>(count_slices(
+                                linearize_flops(c.batches, pairs ? c.pairs : 0), tiles, c.images));
   Footprint sum(kCode + kThread * static_cast<std::uint64_t>(threads - 1));
   sum.add(c.other_bytes, 1);
   add_lists(c, kind, sum);
   add_state(c, sum);
   sum.add(slices * tiles, 8 * kTileDoubles);
   sum.add(slices * c.images, 8 * kDiagonalDoubles);
-  add_scratch(c, kind, threads, sum);
+  add_scratch(c, kind, std::min(slices, static_cast<std::uint64_t>(threads)), sum);
   if (kind == SolverKind::dense) sum.add(c.columns * (c.columns + 8), 8);
   if (kind == SolverKind::sparse) {
     sum.add(c.sparse_doubles, 8);
@@ -135,7 +146,6 @@ std::uint64_t forecast_bytes(const WorkCounts& c, const Plan& plan, int threads)
   }
   if (kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg)
     add_iterative(c, plan, slices, sum);
-  if (kind == SolverKind::implicit_cg && plan.mixed) sum.add(8 * c.kept_fields * c.batches, 4);
   if (c.dogleg) add_dogleg(c, kind, slices, sum);
   if (kind == SolverKind::blocks) sum.add(c.images, 81 * 8 + 76);
   return sum.bytes();

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "eliminate/kept_product.h"
+#include "eliminate/lens_kernels.h"
+#include "lists/slices.h"
 
 namespace sheaf {
 namespace {
@@ -19,6 +21,36 @@ struct LensColumns {
   }
 };
 
+/// Blocks that an image has with it at most: its own, and those of a lens that it alone has.
+std::uint64_t blocks_of_an_image(const LensTracks& tracks) {
+  std::uint64_t most = 1;
+  for (const LensPlaces& lens : tracks.lenses)
+    if (lens.riders > 0) most = std::max<std::uint64_t>(most, 1 + lens.blocks);
+  return most;
+}
+
+/// Before lists are cut, for which nothing but diagonal blocks is wanted of lenses.
+LensCounts count_lenses(const Arrangement& arranged) {
+  const Batches& batches = arranged.batches;
+  const LensTracks& tracks = arranged.tracks;
+  LensCounts out;
+  out.images = tracks.image_lens.size();
+  out.lenses = tracks.lenses.size();
+  out.slices = static_cast<std::uint64_t>(
+      count_slices(linearize_flops(batches.num_batches(), 0), 0, out.images));
+  const std::uint64_t most =
+      std::max<std::uint64_t>(Chunks::kBatchesPerChunk, batches.longest_track);
+  const std::uint64_t chunk = std::min(most, batches.num_batches());
+  // Rows of slots stand beside batches evenly.
+  const std::uint64_t slots =
+      chunk * tracks.first_slot.back() / std::max<std::uint64_t>(1, batches.num_batches());
+  out.scratch_doubles =
+      LensScratch(batches, tracks, {chunk, slots, most_group_slots(tracks), true}).doubles;
+  out.product_doubles = product_scratch_doubles(batches, tracks);
+  out.kept_fields = kept_row::fields(tracks.most_blocks);
+  return out;
+}
+
 }  // namespace
 
 WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clusters& clusters,
@@ -26,8 +58,7 @@ WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clu
   const LensTracks& tracks = arranged.tracks;
   WorkCounts c = count_work(arranged.batches, image_columns(tracks, arranged.columns, true),
                             points_held, clusters, threads);
-  c.any_lens = true;
-  c.kept_fields = kept_row::fields(tracks.most_blocks);
+  c.lenses = count_lenses(arranged);
   c.images_couple = !points_held || tracks.most_blocks > 0;
   const auto images = static_cast<double>(c.columns);
   const LensColumns more(tracks);
@@ -39,7 +70,10 @@ WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clu
   c.sparse_doubles = static_cast<std::uint64_t>(
       static_cast<double>(c.sparse_doubles) * wider * wider + more.border * images);
   c.columns = static_cast<std::uint64_t>(arranged.columns.count);
-  if (more.own > 0) c.tiles *= 4, c.pairs *= 4, c.pair_runs *= 4;
+  // Images that share a point couple all blocks of the one with all of the other; and each image is
+  // coupled with its lens.
+  const std::uint64_t coupled = blocks_of_an_image(tracks) * blocks_of_an_image(tracks);
+  c.tiles *= coupled, c.pairs *= coupled, c.pair_runs *= coupled;
   c.tiles += c.images * static_cast<std::uint64_t>(tracks.most_blocks);
   c.images = arranged.columns.num_images();
   return c;
@@ -55,16 +89,12 @@ WorkCounts count_lens_work(const Arrangement& arranged, const LensChunks& lists,
   c.pair_runs = chunks.pair_runs.size() + slots.pair_runs.size();
   c.tiles = chunks.tiles.size();
   c.only_formed = true;
+  c.lenses->slices = chunks.slices.size() - 1;
+  c.lenses->listed = true;
+  c.lenses->scratch_doubles =
+      LensScratch(arranged.batches, arranged.tracks, chunks, lists.tiles).doubles;
   if (c.images_couple) count_factor(arranged.columns, chunks.tiles, c);
   return c;
-}
-
-std::uint64_t listed_bytes(const LensChunks& chunks) {
-  std::uint64_t sum = 0;
-  for (const Chunks* c : {&chunks.chunks, &chunks.slots})
-    sum += c->pairs.bytes() + c->pair_runs.bytes() + c->diagonal.bytes() +
-           c->diagonal_runs.bytes() + c->tiles.size() * sizeof(Tile);
-  return sum;
 }
 
 }  // namespace sheaf

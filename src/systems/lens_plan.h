@@ -19,7 +19,4 @@ WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clu
 WorkCounts count_lens_work(const Arrangement& arranged, const LensChunks& chunks,
                            const WorkCounts& estimate);
 
-/// What the lists of pairs hold, which forecasts count once more.
-std::uint64_t listed_bytes(const LensChunks& chunks);
-
 }  // namespace sheaf

@@ -107,7 +107,7 @@ double explicit_seconds(const WorkCounts& c) {
 }
 double implicit_seconds(const WorkCounts& c) {
   if (c.only_formed) return std::numeric_limits<double>::infinity();
-  return coarse_seconds(c) + seconds(iterations(c) * (c.any_lens ? kLensImplicitNs : kImplicitNs) *
+  return coarse_seconds(c) + seconds(iterations(c) * (c.lenses ? kLensImplicitNs : kImplicitNs) *
                                      static_cast<double>(c.observations));
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,15 @@ enum class SolverKind { blocks, dense, sparse, explicit_cg, implicit_cg };
 /// "blocks", "dense", "sparse", "iterative-explicit", "iterative-implicit".
 const char* to_string(SolverKind kind);
 
+/// What is different where lenses are of any model: their blocks count as images, and are none.
+struct LensCounts {
+  std::uint64_t images = 0, lenses = 0;
+  std::uint64_t slices = 0;  ///< that sums are cut into, by the pairs of images alone
+  bool listed = false;       ///< the process holds the lists already
+  std::uint64_t scratch_doubles = 0, product_doubles = 0;  ///< of one thread
+  std::uint64_t kept_fields = 0;  ///< of a batch's rows, where a mixed implicit solver keeps them
+};
+
 /// What decides how much a solver costs; counted before it allocates anything.
 struct WorkCounts {
   std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
@@ -37,13 +47,12 @@ struct WorkCounts {
   std::uint32_t longest_track = 0;
   std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
   bool lens_shared = false;
-  bool images_couple = true;      ///< some free point or shared lens couples images
-  bool weighted = false;          ///< a loss leaves a weight for each observation
-  bool dogleg = false;            ///< the gradient is summed by image, steps are blended
-  bool only_formed = false;       ///< there is no implicit product
-  bool any_lens = false;          ///< lenses of any model: implicit products are dearer, and double
-  std::uint64_t kept_fields = 0;  ///< of a batch's rows, where a mixed implicit solver keeps them
-  std::uint64_t other_bytes = 0;  ///< held besides
+  bool images_couple = true;         ///< some free point or shared lens couples images
+  bool weighted = false;             ///< a loss leaves a weight for each observation
+  bool dogleg = false;               ///< the gradient is summed by image, steps are blended
+  bool only_formed = false;          ///< there is no implicit product
+  std::optional<LensCounts> lenses;  ///< of any model: implicit products are dearer
+  std::uint64_t other_bytes = 0;     ///< held besides
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
