@@ -234,17 +234,54 @@ TEST(LensModels, WideLensesConvergeFromADegreeAndAHundredth) {
   }
 }
 
-TEST(LensModels, WhatIsNotThereYetIsRefusedInWords) {
+TEST(LensModels, HeldParametersOfOtherCamerasAreRefusedInWords) {
   Problem problem = mixtures()[2];
   SolveOptions options;
-  options.trust_region = TrustRegion::dogleg;
-  EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
-  options = {};
-  options.points = PointParametrisation::inverse_depth;
-  EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
-  options = {};
   options.fixed.parameters = {0};
   EXPECT_EQ(try_solve(problem, options).error().code(), ErrorCode::usage);
+}
+
+double minimum(const Problem& start, const SolveOptions& wanted) {
+  Problem problem = start;
+  SolveOptions options = wanted;
+  options.tolerance = 1e-13;
+  options.max_iterations = 200;
+  return try_solve(problem, options).value().final_cost;
+}
+
+/// What BAL cameras have: other coordinates of points, the dogleg, mixed precision, by every
+/// solver.
+TEST(LensModels, EveryWayEndsAtTheSameMinimum) {
+  const Problem shared = disturbed({ordinary(CameraModel::opencv)}, 12, 300, 7);
+  for (const Problem& problem :
+       {shared, unshared(shared), disturbed({ordinary(CameraModel::opencv_fisheye)}, 12, 300, 8),
+        disturbed({ordinary(CameraModel::opencv), ordinary(CameraModel::opencv_fisheye),
+                   ordinary(CameraModel::simple_radial)},
+                  12, 300, 11)}) {
+    const double plain = minimum(problem, {});
+    for (CameraSolverKind solver :
+         {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+          CameraSolverKind::iterative_implicit}) {
+      SolveOptions options;
+      options.solver = solver;
+      const auto expect_minimum = [&](const char* what) {
+        SCOPED_TRACE(testing::Message() << what << ", solver " << static_cast<int>(solver));
+        EXPECT_NEAR(minimum(problem, options), plain, 1e-9 * plain);
+      };
+      options.precision = Precision::mixed;
+      expect_minimum("mixed");
+      options.trust_region = TrustRegion::dogleg;
+      expect_minimum("dogleg, mixed");
+      options.precision = Precision::full;
+      expect_minimum("dogleg");
+      options.trust_region = TrustRegion::lm;
+      for (PointParametrisation points :
+           {PointParametrisation::homogeneous, PointParametrisation::inverse_depth}) {
+        options.points = points;
+        expect_minimum("chart");
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "geometry/rigid_motion.h"
 #include "io/bal.h"
 #include "platform/random.h"
+#include "scene/camera_frame.h"
 #include "sheaf/io.h"
 #include "sheaf/solve.h"
 #include "solve/scenes.h"
@@ -171,6 +172,29 @@ TEST(Points, EverySolverTakesThem) {
         EXPECT_NEAR(s.final_cost, best, 1e-8 * best)
             << s.solver << ", " << s.precision << ", " << s.iterations.size() << " steps";
       }
+}
+
+/// One formula under two names: RADIAL goes through BAL's kernels, OPENCV without tangential
+/// distortion through those of any lens.
+TEST(Points, LensesOfAnyModelTakeFarOnesToo) {
+  Problem radial = row_scene(true);
+  from_bal_cameras(radial);
+  Problem opencv = radial;
+  for (Camera& camera : opencv.cameras) {
+    const auto k = camera.parameters;
+    camera.model = CameraModel::opencv;
+    camera.parameters = {k[0], k[0], k[1], k[2], k[3], k[4]};
+  }
+  SolveOptions options;
+  options.fixed.intrinsics = true;
+  for (PointParametrisation points : kCharts)
+    for (CameraSolverKind kind : {CameraSolverKind::dense, CameraSolverKind::iterative_implicit}) {
+      options.solver = kind;
+      options.precision = Precision::full;
+      Problem a = radial, b = opencv;
+      const double expected = solve_with(a, points, options).final_cost;
+      EXPECT_NEAR(solve_with(b, points, options).final_cost, expected, 1e-9 * expected);
+    }
 }
 
 TEST(Points, ThreadsAndInstructionSetsChangeNothing) {
