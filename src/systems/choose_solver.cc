@@ -135,8 +135,18 @@ Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOpt
   implicit.solver = CameraSolverKind::iterative_implicit;
   std::string reason = asked_for(counts, options.solver).reason;
   LensChoice out;
+  bool forms = asked_for(counts, options.solver).kind != SolverKind::implicit_cg;
+  if (forms && !held && options.solver == CameraSolverKind::automatic) {
+    // Lists of pairs that the limit leaves no room for are not cut.
+    WorkCounts formed = counts;
+    formed.only_formed = true;
+    const MemoryHeld memory{resident_bytes(), peak_resident_bytes()};
+    const Result<Choice> fits = choose_solver(formed, options, threads.count(), memory);
+    forms = fits.ok();
+    if (!forms) reason = fits.error().what();
+  }
   // Points that are held make no pairs: to form the matrix is then next to nothing.
-  if (held || asked_for(counts, options.solver).kind != SolverKind::implicit_cg) {
+  if (held || forms) {
     out.chunks =
         cut_lens_chunks(batches, tracks, held ? LensLists::own_lens : LensLists::pairs, threads);
     counts = count_lens_work(arranged, out.chunks, counts);
