@@ -58,5 +58,13 @@ TEST(PhotometricSolvers, ConjugateGradientsEndWhereDenseDoes) {
   }
 }
 
+TEST(PhotometricSolvers, WhatIsNotThereIsRefusedInWords) {
+  PhotometricProblem problem = many_images().start;
+  const auto refused =
+      refine_photometric(problem, options_of(CameraSolverKind::iterative_implicit));
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code(), ErrorCode::usage);
+}
+
 }  // namespace
 }  // namespace sheaf
