@@ -136,11 +136,35 @@ void back_substitute_rows(const RowTrialInput& in, const Chunk& chunk, TrialOutp
     for (std::uint32_t l = 0; l < 8; ++l) substitute_point(in, g, l, out);
 }
 
+/// e = Jc x, u = (V + D)^-1 sum Jp^T e, y += Jc^T (e - Jp u).
+void multiply_point(const RowTrialInput& in, std::size_t g, std::uint32_t lane, double* y) {
+  const Batches::Group& group = in.batches->groups[g];
+  // back_substitute gives L^-T (w - L^-1 s): taken from that of s = 0, (V + D)^-1 s is left.
+  const double* factor = in.factors + kFactorGroup * g + lane;
+  const Vector3<double> with = back_substitute(factor, coupling(in, g, lane));
+  const Vector3<double> without = back_substitute(factor, {});
+  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+    const PointRow row = kept_row(in.rows, g, b, lane);
+    const std::size_t block = kBlockVector * in.batches->image[8 * b + lane];
+    for (std::size_t r = 0; r < 2; ++r) {
+      double e = 0;
+      for (std::size_t k = 0; k < 9; ++k) e += row.camera[r][k] * in.steps[block + k];
+      for (std::size_t i = 0; i < 3; ++i) e -= row.point[r][i] * (without[i] - with[i]);
+      for (std::size_t k = 0; k < 9; ++k) y[block + k] += row.camera[r][k] * e;
+    }
+  }
+}
+
+void multiply(const RowTrialInput& in, const Chunk& chunk, double* y) {
+  for (std::size_t g = chunk.first_group; g < chunk.end_group; ++g)
+    for (std::uint32_t l = 0; l < in.batches->groups[g].lanes; ++l) multiply_point(in, g, l, y);
+}
+
 }  // namespace
 
 const RowKernels& reference_row_kernels() {
-  static const RowKernels kernels{"scalar", kReferenceLanes, &eliminate, &pose_diagonal,
-                                  &back_substitute_rows};
+  static const RowKernels kernels{"scalar",       kReferenceLanes,       &eliminate,
+                                  &pose_diagonal, &back_substitute_rows, &multiply};
   return kernels;
 }
 

@@ -15,6 +15,7 @@
 
 #include "eliminate/point_trial-inl.h"
 #include "eliminate/row_source-inl.h"
+#include "eliminate/schur_product-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -37,6 +38,46 @@ void back_substitute_rows(const RowTrialInput& in, const Chunk& chunk, TrialOutp
   with_kept(in.rows, [&](auto* kept) {
     trial_chunk<SourceOf<decltype(kept)>, false, false>({held, held, in.factors, nullptr, {}},
                                                         chunk, out);
+  });
+}
+
+template <class Source>
+void multiply_group(const RowState& in, const double* factors, std::size_t g, double* y) {
+  const Batches& batches = *in.batches;
+  const Batches::Group& group = batches.groups[g];
+  V u[kParts][3];
+  for (int part = 0; part < kParts; ++part) {
+    const GroupPart of(group, g, part);
+    const Source source(in, of, nullptr);
+    V s[3] = {zero(), zero(), zero()};
+    for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+      source.couple(b, nullptr, s);
+    solve_point(factors + kFactorGroup * g + of.lane(), s, u[part]);
+  }
+  for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
+    alignas(64) double rows[64], ninth[8];
+    for (int part = 0; part < kParts; ++part) {
+      const GroupPart of(group, g, part);
+      const Source source(in, of, nullptr);
+      const LaneJacobian j = source.rows(b, nullptr, nullptr);
+      V x[9], e[2], v[9];
+      source.load_x(in.steps, b, x);
+      times_block(j, x, e);
+      for (int r = 0; r < 2; ++r)
+        for (int i = 0; i < 3; ++i) e[r] = fnma(j.point[r][i], u[part][i], e[r]);
+      for (int k = 0; k < 9; ++k) v[k] = fma(j.camera[0][k], e[0], hn::Mul(j.camera[1][k], e[1]));
+      store_records(v, rows + 8 * of.lane(), 8);
+      store(v[8], ninth + of.lane());
+    }
+    scatter(rows, ninth, &batches.image[8 * b], batches.uniform[b], y);
+  }
+}
+
+void multiply_rows(const RowTrialInput& in, const Chunk& chunk, double* y) {
+  const RowState held{in.batches, &in.rows, in.points, in.steps, false};
+  with_kept(in.rows, [&](auto* kept) {
+    for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
+      multiply_group<SourceOf<decltype(kept)>>(held, in.factors, g, y);
   });
 }
 
@@ -79,7 +120,8 @@ void pose_diagonal(const Chunks& chunks, const Chunk& chunk, const Records& from
 }
 
 constexpr RowKernels row_table() {
-  return {set_name(HWY_TARGET), kLanes, &eliminate_rows, &pose_diagonal, &back_substitute_rows};
+  return {set_name(HWY_TARGET),  kLanes,        &eliminate_rows, &pose_diagonal,
+          &back_substitute_rows, &multiply_rows};
 }
 
 }  // namespace HWY_NAMESPACE

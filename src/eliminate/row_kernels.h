@@ -47,6 +47,9 @@ struct RowKernels {
   void (*pose_diagonal)(const Chunks&, const Chunk&, const Records&, double* diagonal);
   /// Back-substitutes the chunk's points into out.points; adds to out.damping_term, out.step2_max.
   void (*back_substitute)(const RowTrialInput&, const Chunk&, TrialOutput& out);
+  /// y += (U - W (V + D)^-1 W^T) x of the chunk's points, x being the steps, kProductRecord doubles
+  /// per block; nothing formed, the rows read or made twice.
+  void (*product)(const RowTrialInput&, const Chunk&, double* y);
 };
 /// Plain scalar code, one observation at a time: the twin that the others are tested against.
 const RowKernels& reference_row_kernels();

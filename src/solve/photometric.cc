@@ -244,8 +244,6 @@ Result<Pattern> check_photometric(const PhotometricProblem& problem,
     return usage("a pyramid needs points on the rays of hosts: stored patches have one size only");
   if (!rays && options.warp == Warp::inverse_depth)
     return usage("the warp by inverse depth needs points on the rays of hosts");
-  if (options.solver == CameraSolverKind::iterative_implicit)
-    return usage("patches have no implicit product yet: take the explicit iterative solver");
   if (options.levels < 1 || options.levels > 6) return usage("levels are 1 to 6");
   if (options.rounds < 1) return usage("rounds are 1 or more");
   for (std::size_t i = 0; i < problem.images.size(); ++i)

@@ -189,23 +189,51 @@ void PatchBlocks::fold(const Poses& poses, const std::vector<Brightness>& bright
   }
 }
 
-void PatchBlocks::step(const Poses& poses, const std::vector<Brightness>& brightness,
-                       const double* image_steps, double* block_steps) const {
-  constexpr std::size_t kStep = kBlockVector;
+std::vector<PatchBlocks::Maps> PatchBlocks::all_maps(
+    const Poses& poses, const std::vector<Brightness>& brightness) const {
+  std::vector<Maps> out;
+  for (std::size_t b = 0; b < hosts_.size(); ++b) out.push_back(maps_of(b, poses, brightness));
+  return out;
+}
+
+void PatchBlocks::to_blocks(const std::vector<Maps>& maps, const double* images,
+                            double* blocks) const {
   for (std::size_t b = 0; b < targets_.size(); ++b) {
-    double* to = block_steps + kStep * b;
-    std::fill(to, to + kStep, 0.0);
-    const double* target = image_steps + kStep * targets_[b];
+    double* to = blocks + kBlockVector * b;
+    std::fill_n(to, kBlockVector, 0.0);
+    const double* target = images + kBlockVector * targets_[b];
     if (!are_pairs()) {
-      std::copy(target, target + kStep, to);
+      std::copy_n(target, kBlockVector, to);
       continue;
     }
-    const double* host = image_steps + kStep * hosts_[b];
-    const Maps maps = maps_of(b, poses, brightness);
-    for (int i = 0; i < 8; ++i)
-      for (int k = 0; k < 8; ++k)
-        to[i] += maps.target[8 * i + k] * target[k] + maps.host[8 * i + k] * host[k];
+    const double* host = images + kBlockVector * hosts_[b];
+    for (std::size_t i = 0; i < 8; ++i)
+      for (std::size_t k = 0; k < 8; ++k)
+        to[i] += maps[b].target[8 * i + k] * target[k] + maps[b].host[8 * i + k] * host[k];
   }
+}
+
+void PatchBlocks::add_to_images(const std::vector<Maps>& maps, const double* blocks,
+                                double* images) const {
+  for (std::size_t b = 0; b < targets_.size(); ++b) {
+    const double* from = blocks + kBlockVector * b;
+    double* target = images + kBlockVector * targets_[b];
+    if (!are_pairs()) {
+      for (std::size_t k = 0; k < kBlockVector; ++k) target[k] += from[k];
+      continue;
+    }
+    double* host = images + kBlockVector * hosts_[b];
+    for (std::size_t i = 0; i < 8; ++i)
+      for (std::size_t k = 0; k < 8; ++k) {
+        target[k] += maps[b].target[8 * i + k] * from[i];
+        host[k] += maps[b].host[8 * i + k] * from[i];
+      }
+  }
+}
+
+void PatchBlocks::step(const Poses& poses, const std::vector<Brightness>& brightness,
+                       const double* image_steps, double* block_steps) const {
+  to_blocks(all_maps(poses, brightness), image_steps, block_steps);
 }
 
 }  // namespace sheaf

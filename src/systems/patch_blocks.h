@@ -58,6 +58,13 @@ class PatchBlocks {
   void step(const Poses& poses, const std::vector<Brightness>& brightness,
             const double* image_steps, double* block_steps) const;
 
+  /// Of all blocks, for many vectors at one state; empty where blocks are images.
+  std::vector<Maps> all_maps(const Poses& poses, const std::vector<Brightness>& brightness) const;
+  /// Blocks' vectors from images' and back: x_pair = Y x_target + Z x_host, and its transpose,
+  /// which is added. kBlockVector doubles each.
+  void to_blocks(const std::vector<Maps>& maps, const double* images, double* blocks) const;
+  void add_to_images(const std::vector<Maps>& maps, const double* blocks, double* images) const;
+
  private:
   Maps maps_of(std::size_t block, const Poses& poses,
                const std::vector<Brightness>& brightness) const;

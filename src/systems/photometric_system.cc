@@ -35,7 +35,9 @@ PhotometricSystem::Parts PhotometricSystem::make(const PatchScene& scene, const 
   for (const Brightness& of : state.brightness) cameras.sets.push_back({of.a, of.b});
   const Columns& columns = rows->columns();
   Plan plan{kind_of(rules.solver, columns.count), ""};
-  if (plan.kind == SolverKind::explicit_cg && rows->blocks_are_images() && !rules.points_held)
+  const bool iterates =
+      plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
+  if (iterates && rows->blocks_are_images() && !rules.points_held)
     plan.clusters = coarse_clusters(rows->batches(), rows->pose_columns(), threads);
   Start start{std::move(cameras), CameraColumns::of_brightness(columns), &state.points};
   PixelRows* const pixels = rows.get();

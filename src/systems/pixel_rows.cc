@@ -8,6 +8,8 @@
 
 #include "eliminate/lens_kernels.h"
 #include "rows/exact_patches.h"
+#include "systems/implicit_solver.h"
+#include "systems/product_sums.h"
 
 namespace sheaf {
 
@@ -411,7 +413,68 @@ PatchState PixelRows::held_state() const {
   return out;
 }
 
-std::unique_ptr<CameraSolver> PixelRows::make_implicit(const Columns&, bool) { return {}; }
+/// S x by images: their blocks' rows read again, what patches say of brightness alone, the priors.
+class PixelRows::Operator : public StateOperator {
+ public:
+  explicit Operator(const PixelRows& rows)
+      : rows_(rows),
+        sums_(rows.chunks_, rows.blocks_.count(), 0, rows.threads_),
+        alone_(kDiagonalDoubles * rows.blocks_.count()),
+        x_(kBlockVector * rows.blocks_.count()),
+        y_(kBlockVector * rows.blocks_.count()) {}
+
+  void prepare(const double*) override {
+    const CameraState& held = rows_.state_->held.cameras;
+    maps_ = rows_.blocks_.all_maps(held.poses, brightness_of(held));
+    alone_.fill(0);
+    if (!rows_.rules_.brightness) return;
+    for (const Chunk& chunk : rows_.patch_chunks().chunks)
+      rows_.add_brightness(chunk, alone_.data());
+  }
+
+  void apply(const double* x, double* y) override {
+    rows_.blocks_.to_blocks(maps_, x, x_.data());
+    const PhotometricInput patches = rows_.patches_at(rows_.state_->held, rows_.held_);
+    const RowTrialInput in{&rows_.batches(), rows_.kept(patches), x_.data(),
+                           rows_.state_->held.points.data(), rows_.state_->factors.data()};
+    sums_.run([&](const Chunk& chunk, double*,
+                  double* sums) { rows_.row_kernels_.product(in, chunk, sums); },
+              [&](std::size_t b, const double* total) { finish(b, total); });
+    const std::size_t images = rows_.scene_.num_images();
+    std::fill_n(y, kBlockVector * images, 0.0);
+    rows_.blocks_.add_to_images(maps_, y_.data(), y);
+    if (!rows_.rules_.brightness) return;
+    for (std::size_t i = 0; i < images; ++i) {
+      y[kBlockVector * i + 6] += x[kBlockVector * i + 6] / square(rows_.rules_.prior_a);
+      y[kBlockVector * i + 7] += x[kBlockVector * i + 7] / square(rows_.rules_.prior_b);
+    }
+  }
+  std::uint64_t bytes() const override {
+    return sums_.bytes() + alone_.bytes() + x_.bytes() + y_.bytes() +
+           maps_.size() * sizeof(PatchBlocks::Maps);
+  }
+
+ private:
+  static double square(double x) { return x * x; }
+  void finish(std::size_t block, const double* total) {
+    double* to = &y_[kBlockVector * block];
+    std::fill_n(to, kBlockVector, 0.0);
+    std::copy_n(total, kCameraColumns, to);
+    const double *S = &alone_[kDiagonalDoubles * block], *x = &x_[kBlockVector * block];
+    for (int r = 6; r < 8; ++r)
+      for (int k = 6; k < 8; ++k) to[r] += S[diagonal_layout::at(r, k)] * x[k];
+  }
+
+  const PixelRows& rows_;
+  ProductSums sums_;
+  Buffer<double> alone_;  ///< kDiagonalDoubles per block: brightness of patches alone
+  Buffer<double> x_, y_;  ///< kBlockVector per block
+  std::vector<PatchBlocks::Maps> maps_;
+};
+
+std::unique_ptr<CameraSolver> PixelRows::make_implicit(const Columns& columns, bool) {
+  return make_implicit_solver(columns, std::make_unique<Operator>(*this), nullptr, threads_);
+}
 
 std::uint64_t PixelRows::bytes() const {
   std::uint64_t sum = rays_.bytes() + leaving_.bytes() + leaving_costs_.bytes() +

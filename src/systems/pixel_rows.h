@@ -70,6 +70,7 @@ class PixelRows : public PointRows {
   std::uint64_t bytes() const override;
 
  private:
+  class Operator;
   struct Half {  ///< all that belongs to one state: the held one or the one tried
     Buffer<double> views, brightness_sums, seen;
     Buffer<double> factors;  ///< of the patches; or, where some points' rows are others:

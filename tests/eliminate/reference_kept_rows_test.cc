@@ -48,7 +48,7 @@ struct Settings {
 
 /// Everything that the kernels produce.
 struct Outcome {
-  Buffer<double> diagonal, tiles, factors, points;
+  Buffer<double> product, diagonal, tiles, factors, points;
   EliminateOutput eliminated{};
   TrialOutput trial{};
 };
@@ -84,6 +84,10 @@ class Kept {
       expect_same_tiles(got.tiles, expected.tiles, chunks_.tiles, expected.diagonal, kTolerance);
       expect_close(got.factors, expected.factors, kTolerance, "factor");
       expect_close(got.points, expected.points, kTolerance, "point");
+      double most = 0;
+      for (double y : expected.product) most = std::max(most, std::abs(y));
+      for (std::size_t i = 0; i < got.product.size(); ++i)
+        ASSERT_NEAR(got.product[i], expected.product[i], kTolerance * most) << "product, " << i;
       const auto near = [](double a, double b) { EXPECT_NEAR(a, b, kTolerance * std::abs(b)); };
       near(got.eliminated.point_decrease, expected.eliminated.point_decrease);
       near(got.eliminated.gradient_max2, expected.eliminated.gradient_max2);
@@ -123,7 +127,12 @@ class Kept {
       }
     }
     const RowTrialInput back{&batches_, kept, steps_.data(), points_.data(), out.factors.data()};
-    for (const Chunk& chunk : chunks_.chunks) kernels.back_substitute(back, chunk, out.trial);
+    out.product.allocate(kProductRecord * blocks_);
+    out.product.fill(0);
+    for (const Chunk& chunk : chunks_.chunks) {
+      kernels.back_substitute(back, chunk, out.trial);
+      kernels.product(back, chunk, out.product.data());
+    }
     for (std::size_t g = 0; g < batches_.groups.size(); ++g)  // beyond a group's points: nothing
       for (std::uint32_t l = batches_.groups[g].lanes; l < 8; ++l)
         for (std::size_t k = 0; k < 12; ++k) out.factors[kFactorGroup * g + 8 * k + l] = 0;

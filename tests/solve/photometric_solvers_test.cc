@@ -52,18 +52,11 @@ TEST(PhotometricSolvers, ConjugateGradientsEndWhereDenseDoes) {
   const double dense = final_cost(scene.start, options_of(CameraSolverKind::dense), "dense");
   for (const auto& [solver, name] :
        {std::pair{CameraSolverKind::sparse, "sparse"},
-        std::pair{CameraSolverKind::iterative_explicit, "iterative-explicit"}}) {
+        std::pair{CameraSolverKind::iterative_explicit, "iterative-explicit"},
+        std::pair{CameraSolverKind::iterative_implicit, "iterative-implicit"}}) {
     SCOPED_TRACE(name);
     EXPECT_NEAR(final_cost(scene.start, options_of(solver), name), dense, 1e-9 * dense);
   }
-}
-
-TEST(PhotometricSolvers, WhatIsNotThereIsRefusedInWords) {
-  PhotometricProblem problem = many_images().start;
-  const auto refused =
-      refine_photometric(problem, options_of(CameraSolverKind::iterative_implicit));
-  ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code(), ErrorCode::usage);
 }
 
 }  // namespace
