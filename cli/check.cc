@@ -64,13 +64,14 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_check(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("check", "what is wrong with a problem, and what to do");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf check problem.txt --json check.json");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb check_verb() {
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"check", "what is wrong with a problem, and what to do",
+            "Example:\n  sheaf check problem.txt --json check.json"};
+  verb.places = bound<Arguments>({FieldsOf<Arguments>::text(&Arguments::in, problem_in())}, *a);
+  verb.options = options_of(a->common);
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -89,45 +89,67 @@ int run(const Arguments& arguments) {
   return 0;
 }
 
-void add_clean_options(CLI::App& verb, CleanOptions& clean) {
-  verb.add_option("--max-error", clean.max_error_px,
-                  "leave out observations whose residual is longer, or not finite")
-      ->type_name("PX")
-      ->check(number_in(0, 1e300, false, "a number of pixels above 0"));
-  verb.add_flag("--drop-behind", clean.behind,
-                "leave out observations whose point lies behind the camera");
-  verb.add_flag("--drop-repeated", clean.repeated,
-                "leave out observations that occur twice, pixel and all");
-  verb.add_option("--min-angle", clean.min_angle_deg,
-                  "leave out points whose rays meet at less than this at most")
-      ->type_name("DEGREES")
-      ->check(number_in(0, 180, false, "an angle above 0, degrees"));
-  verb.add_option("--min-track", clean.min_track, "leave out points with fewer observations left")
-      ->type_name("N")
-      ->check(whole_number_from(1, "a whole number from 1 up"));
+OptionTable<CleanOptions> clean_fields() {
+  using F = FieldsOf<CleanOptions>;
+  return {
+      F::unless_zero(&CleanOptions::max_error_px,
+                     {.name = "max-error",
+                      .placeholder = "PX",
+                      .unit = "px",
+                      .range = above(0),
+                      .help = "leave out observations whose residual is longer, or not finite"}),
+      F::flag(&CleanOptions::behind,
+              {.name = "drop-behind",
+               .help = "leave out observations whose point lies behind the camera"}),
+      F::flag(&CleanOptions::repeated,
+              {.name = "drop-repeated",
+               .help = "leave out observations that occur twice, pixel and all"}),
+      F::unless_zero(&CleanOptions::min_angle_deg,
+                     {.name = "min-angle",
+                      .placeholder = "DEGREES",
+                      .unit = "deg",
+                      .range = {.lowest = 0, .highest = 180, .above = true},
+                      .help = "leave out points whose rays meet at less than this at most"}),
+      F::unless_zero(&CleanOptions::min_track,
+                     {.name = "min-track",
+                      .placeholder = "N",
+                      .range = from(1),
+                      .help = "leave out points with fewer observations left"})};
 }
 
 }  // namespace
 
-void add_convert(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("convert", "read a problem and write it in another format");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  verb.add_option("OUT", arguments->out, kProblemOut)->type_name("FILE")->required();
-  verb.add_option(
-          "--format", arguments->format,
-          "write this whatever the name: bal, colmap (binary), colmap-text, bundler, nvm, libmv "
-          "or ply; what it does not hold is said")
-      ->type_name("NAME")
-      ->check(one_of({"bal", "colmap", "colmap-text", "bundler", "nvm", "libmv", "ply"}));
-  add_clean_options(verb, arguments->clean);
-  add_common_options(verb, arguments->common);
-  verb.footer(
+Verb convert_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{
+      "convert", "read a problem and write it in another format",
       "Example:\n  sheaf convert problem.txt problem.ply\n"
       "\nA COLMAP model as text:\n  sheaf convert model/ readable --format colmap-text\n"
       "\nWithout what misleads a solver:\n"
-      "  sheaf convert model/ clean --max-error 8 --drop-behind --min-angle 1.5 --min-track 2");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      "  sheaf convert model/ clean --max-error 8 --drop-behind --min-angle 1.5 --min-track 2"};
+  verb.places = bound<Arguments>(
+      {F::text(&Arguments::in, problem_in()),
+       F::text(&Arguments::out, {.name = "OUT", .placeholder = "FILE", .help = kProblemOut})},
+      *a);
+  verb.options =
+      joined({bound<Arguments>({F::name(&Arguments::format,
+                                        {{"bal"},
+                                         {"colmap", "binary"},
+                                         {"colmap-text"},
+                                         {"bundler"},
+                                         {"nvm"},
+                                         {"libmv"},
+                                         {"ply"}},
+                                        {.name = "format",
+                                         .placeholder = "NAME",
+                                         .nothing = true,
+                                         .help = "write this whatever the name, and say what it "
+                                                 "does not hold"})},
+                               *a),
+              bound(clean_fields(), a->clean), options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

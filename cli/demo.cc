@@ -10,11 +10,12 @@
 #include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
+#include "options/scene_options.h"
+#include "options/solve_options.h"
 #include "outputs.h"
 #include "photometric/photometric_demo.h"
 #include "progress.h"
 #include "report/errors.h"
-#include "scene_arguments.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -103,8 +104,9 @@ int run(const Arguments& arguments) {
   const Timer writing;
   if (!arguments.ply.empty()) write_ply(scene.start, problem, arguments.ply).value();
   if (!json.empty()) {
+    SolveArguments asked;
     SolveRecord record{.input = generated_input(problem),
-                       .arguments = SolveArguments(),
+                       .options = options_json(options_of(asked)),
                        .before = evaluate(scene.start),
                        .after = evaluate(problem),
                        .read_s = generate_s,
@@ -122,16 +124,16 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_demo(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand(
-      "demo", "make a scene, disturb it, solve it, look at it; then one of images");
-  add_scene_options(verb, arguments->scene);
-  verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
-      ->type_name("FILE");
-  add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf demo --cameras 30 --points 2000 --ply demo.ply");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb demo_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"demo", "make a scene, disturb it, solve it, look at it; then one of images",
+            "Example:\n  sheaf demo --cameras 30 --points 2000 --ply demo.ply"};
+  verb.options = joined({bound(scene_fields(), a->scene),
+                         bound<Arguments>({F::text(&Arguments::ply, ply_of_two_states())}, *a),
+                         options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -74,29 +74,39 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_evaluate(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand(
-      "evaluate", "how far an estimate's poses and points are from a reference");
-  verb.add_option("EST", arguments->estimate, "estimate: a file or folder, as in convert")
-      ->type_name("FILE")
-      ->required();
-  verb.add_option("REF", arguments->reference,
-                  "reference with the same images and points; lengths are in its units")
-      ->type_name("FILE")
-      ->required();
-  CLI::Option* raw = verb.add_flag("--no-align", arguments->no_align,
-                                   "compare as they are; otherwise the Sim(3) that brings the "
-                                   "camera centres together best is applied first");
-  verb.add_flag("--robust", arguments->robust, "align so that images that are far off do not count")
-      ->excludes(raw);
-  verb.add_option("--csv", arguments->csv, "also write each image's errors")->type_name("FILE");
-  add_common_options(verb, arguments->common);
-  verb.footer(
-      "Example:\n  sheaf evaluate problem.txt problem.txt --csv errors.csv\n"
-      "\nHow far a solution is from the truth of a generated scene:\n"
-      "  sheaf evaluate refined.txt truth.txt --json errors.json");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb evaluate_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"evaluate", "how far an estimate's poses and points are from a reference",
+            "Example:\n  sheaf evaluate problem.txt problem.txt --csv errors.csv\n"
+            "\nHow far a solution is from the truth of a generated scene:\n"
+            "  sheaf evaluate refined.txt truth.txt --json errors.json"};
+  verb.places = bound<Arguments>(
+      {F::text(&Arguments::estimate, {.name = "EST",
+                                      .placeholder = "FILE",
+                                      .help = "estimate: a file or folder, as in convert"}),
+       F::text(&Arguments::reference,
+               {.name = "REF",
+                .placeholder = "FILE",
+                .help = "reference with the same images and points; lengths are in its units"})},
+      *a);
+  verb.options = joined(
+      {bound<Arguments>(
+           {F::flag(&Arguments::no_align,
+                    {.name = "no-align",
+                     .help = "compare as they are; otherwise the Sim(3) that brings the camera "
+                             "centres together best is applied first"}),
+            F::flag(&Arguments::robust,
+                    {.name = "robust",
+                     .help = "align so that images that are far off do not count",
+                     .excludes = {"no-align"}}),
+            F::text(
+                &Arguments::csv,
+                {.name = "csv", .placeholder = "FILE", .help = "also write each image's errors"})},
+           *a),
+       options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

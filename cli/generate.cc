@@ -5,12 +5,15 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "counting_sink.h"
 #include "inspect/statistics.h"
 #include "interrupt.h"
 #include "json_document.h"
+#include "options/scene_options.h"
 #include "outputs.h"
 #include "photometric/generate_photometric.h"
 #include "platform/memory.h"
@@ -30,6 +33,7 @@ struct Arguments {
   LensArguments lens;
   PhotometricSceneArguments photometric;
   std::string out, truth;
+  std::set<std::string> given;  ///< names of the options that were
 };
 
 /// What was written, whatever way it was made.
@@ -122,43 +126,59 @@ int run(const Arguments& arguments) {
   return 0;
 }
 
+// Of images; what both kinds of scenes have under one name has a default of its own in each.
+int run_photometric(const Arguments& arguments) {
+  PhotometricSceneOptions options = arguments.photometric.scene;
+  options.eight_bit = true;
+  if (arguments.given.contains("cameras"))
+    options.images = static_cast<std::uint32_t>(arguments.scene.images);
+  if (arguments.given.contains("points"))
+    options.points = static_cast<std::uint32_t>(arguments.scene.points);
+  if (arguments.given.contains("outliers")) options.outliers = arguments.family.outliers;
+  options.seed = arguments.scene.seed;
+  return generate_photometric(options, arguments.out, arguments.truth, arguments.common.json);
+}
+
+void remember_given(std::vector<BoundOption>& options, std::set<std::string>& given) {
+  for (BoundOption& option : options)
+    option.put = [&given, name = option.spec.name, put = option.put](const OptionValue& value) {
+      given.insert(name);
+      put(value);
+    };
+}
+
 }  // namespace
 
-void add_generate(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("generate", "make a synthetic scene, disturbed");
-  verb.add_option(
-          "OUT", arguments->out,
-          "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --camera (a COLMAP "
-          "model) and --photometric")
-      ->type_name("FILE")
-      ->required();
-  verb.add_option("--truth", arguments->truth,
-                  "also write the undisturbed scene, with its exact pixels")
-      ->type_name("FILE");
-  add_scene_options(verb, arguments->scene);
-  add_family_options(verb, arguments->family);
-  add_lens_options(verb, arguments->lens);
-  add_photometric_scene_options(verb, arguments->photometric);
-  add_common_options(verb, arguments->common);
-  verb.footer(
-      "Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt\n"
-      "\nA synthetic scene of a published problem's size:\n"
-      "  sheaf generate street.txt --like ladybug-138\n"
-      "\nA COLMAP model of 500 images through one fisheye:\n"
-      "  sheaf generate model --camera OPENCV_FISHEYE --shared --cameras 500 --points 20000\n"
-      "\nImages of a textured surface, poses and points for sheaf photometric:\n"
-      "  sheaf generate scene --photometric --truth truth");
-  verb.callback([arguments, &exit_code, &verb] {
-    if (!arguments->photometric.chosen) {
-      exit_code = run(*arguments);
-      return;
-    }
-    if (verb.count("--outliers") > 0)
-      arguments->photometric.scene.outliers = arguments->family.outliers;
-    exit_code = generate_photometric(verb, arguments->photometric, arguments->scene, arguments->out,
-                                     arguments->truth, arguments->common.json);
-  });
+Verb generate_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"generate", "make a synthetic scene, disturbed",
+            "Example:\n  sheaf generate scene.txt --cameras 40 --points 3000 --truth truth.txt\n"
+            "\nA synthetic scene of a published problem's size:\n"
+            "  sheaf generate street.txt --like ladybug-138\n"
+            "\nA COLMAP model of 500 images through one fisheye:\n"
+            "  sheaf generate model --camera OPENCV_FISHEYE --shared --cameras 500 --points 20000\n"
+            "\nImages of a textured surface, poses and points for sheaf photometric:\n"
+            "  sheaf generate scene --photometric --truth truth"};
+  verb.places = bound<Arguments>(
+      {F::text(&Arguments::out,
+               {.name = "OUT",
+                .placeholder = "FILE",
+                .help = "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --camera "
+                        "(a COLMAP model) and --photometric"})},
+      *a);
+  verb.options = joined(
+      {bound<Arguments>(
+           {F::text(&Arguments::truth, {.name = "truth",
+                                        .placeholder = "FILE",
+                                        .help = "also write the undisturbed scene, with its exact "
+                                                "pixels"})},
+           *a),
+       bound(scene_fields(), a->scene), options_of(a->family), options_of(a->lens),
+       options_of(a->photometric), options_of(a->common)});
+  remember_given(verb.options, a->given);
+  verb.run = [a] { return a->photometric.chosen ? run_photometric(*a) : run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -155,18 +155,22 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_info(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb =
-      *app.add_subcommand("info", "what is in a problem, and how well it fits as it is");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  verb.add_option("--pattern", arguments->pattern,
-                  "also draw the network of images and the patterns of Jacobian, Hessian and "
-                  "reduced camera matrix, as PNG")
-      ->type_name("FILE");
-  add_common_options(verb, arguments->common);
-  verb.footer("Example:\n  sheaf info problem.txt --json info.json --pattern pattern.png");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb info_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"info", "what is in a problem, and how well it fits as it is",
+            "Example:\n  sheaf info problem.txt --json info.json --pattern pattern.png"};
+  verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
+  verb.options = joined(
+      {bound<Arguments>({F::text(&Arguments::pattern,
+                                 {.name = "pattern",
+                                  .placeholder = "FILE",
+                                  .help = "also draw the network of images and the patterns of "
+                                          "Jacobian, Hessian and reduced camera matrix, as PNG"})},
+                        *a),
+       options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

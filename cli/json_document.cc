@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "inspect/statistics.h"
 #include "io/output_file.h"
@@ -31,23 +32,15 @@ Json iteration_json(const Iteration& it) {
           {"time_s", number(it.time_s)}};
 }
 
-Json options_json(const SolveArguments& a) {
-  return {{"max_iterations", a.max_iterations},
-          {"tolerance", a.tolerance},
-          {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
-          {"loss", a.loss},
-          {"cheirality", a.cheirality},
-          {"fix", items_of(a.refinement.fix)},
-          {"refine", items_of(a.refinement.refine)},
-          {"points", a.points},
-          {"solver", a.solver},
-          {"precision", a.precision},
-          {"memory_limit_bytes", a.memory_limit_bytes},
-          {"trust_region", a.trust_region},
-          {"initial_damping", a.initial_damping},
-          {"inner_iterations", a.inner_iterations},
-          {"simd", a.simd}};
-}
+/// What a variant of options holds, as JSON has it.
+struct AsJson {
+  Json operator()(std::monostate) const { return {}; }
+  Json operator()(double value) const { return number(value); }
+  template <class Value>
+  Json operator()(const Value& value) const {
+    return value;
+  }
+};
 
 Json range_json(const Range& range) {
   return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
@@ -56,6 +49,14 @@ Json range_json(const Range& range) {
 }  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json options_json(const std::vector<BoundOption>& options) {
+  Json out = Json::object();
+  for (const BoundOption& option : options)
+    if (option.spec.reach == OptionReach::verb)
+      out[key_of(option.spec)] = std::visit(AsJson(), option.get());
+  return out;
+}
 
 Json iterations_json(const Summary& summary) {
   Json iterations = Json::array();
@@ -127,7 +128,7 @@ Json scene_options_json(const SceneOptions& o) {
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
   return {{"version", SHEAF_VERSION},
           {"input", record.input},
-          {"options", options_json(record.arguments)},
+          {"options", record.options},
           {"solver", {{"name", s.solver}, {"reason", s.solver_reason}}},
           {"precision", s.precision},
           {"simd", s.simd},

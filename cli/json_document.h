@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "options/option_field.h"
 #include "sheaf/io.h"
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
-#include "solve_arguments.h"
 
 namespace sheaf {
 
@@ -28,13 +28,14 @@ Json counts_json(const Problem& problem);
 Json observations_json(const std::vector<std::uint64_t>& ids, const Problem& problem);
 Json statistics_json(const Statistics& statistics);
 Json scene_options_json(const SceneOptions& options);
+/// Key and value of each option that a verb has of its own.
+Json options_json(const std::vector<BoundOption>& options);
 Json iterations_json(const Summary& summary);
 Json loss_json(const Summary& summary);
 
 /// What the JSON of a solve is made of.
 struct SolveRecord {
-  Json input;
-  SolveArguments arguments;
+  Json input, options;
   Evaluation before, after;  ///< by independent code
   double read_s = 0, cpu_s = 0, write_s = 0, total_s = 0;
 };

@@ -8,7 +8,8 @@
 
 #include "interrupt.h"
 #include "json_document.h"
-#include "noise_arguments.h"
+#include "noise_document.h"
+#include "options/noise_options.h"
 #include "outputs.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -20,7 +21,7 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
-  NoiseArguments noise;
+  NoiseOptions noise;
   std::string in, out;
 };
 
@@ -77,7 +78,7 @@ int run(const Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
-  const NoiseOptions noise = noise_options(arguments.noise);
+  const NoiseOptions& noise = arguments.noise;
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);
   Effect effect;
@@ -98,23 +99,26 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_perturb(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("perturb", "add noise and outliers to a problem");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  verb.add_option("OUT", arguments->out, std::string("the disturbed problem; ") + kProblemOut)
-      ->type_name("FILE")
-      ->required();
-  add_noise_options(verb, arguments->noise);
-  add_common_options(verb, arguments->common);
-  verb.footer(
+Verb perturb_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{
+      "perturb", "add noise and outliers to a problem",
       "Example:\n  sheaf perturb problem.txt start.txt --rotation 0.01 --center 0.05 --pixel 0.5 "
       "--seed 7\n"
       "\nAs rootba's published experiments start (the numbers drawn are Sheaf's own):\n"
       "  sheaf perturb problem.txt start.txt --protocol rootba\n"
       "\nEvery tenth measurement wrong by 50 px:\n"
-      "  sheaf perturb problem.txt start.txt --outliers 0.1 --outlier-size 50");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      "  sheaf perturb problem.txt start.txt --outliers 0.1 --outlier-size 50"};
+  verb.places = bound<Arguments>(
+      {F::text(&Arguments::in, problem_in()),
+       F::text(&Arguments::out, {.name = "OUT",
+                                 .placeholder = "FILE",
+                                 .help = std::string("the disturbed problem; ") + kProblemOut})},
+      *a);
+  verb.options = joined({bound(noise_fields(), a->noise), options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -3,100 +3,78 @@
 #include "scene_arguments.h"
 
 #include <cmath>
-#include <limits>
-
-#include "verb.h"
+#include <string>
+#include <vector>
 
 namespace sheaf {
 
-void add_scene_options(CLI::App& verb, SceneOptions& o) {
-  const double most = std::numeric_limits<double>::max();
-  const auto noise = [&](const char* name, double& value, const char* what) {
-    verb.add_option(name, value, what)
-        ->type_name("SIGMA")
-        ->check(number_in(0, most, true, "a number from 0 up"))
-        ->capture_default_str();
-  };
-  verb.add_option("--cameras", o.images,
-                  "images, each with a lens of its own unless --camera says so")
-      ->type_name("N")
-      ->check(whole_number_from(2, "a whole number from 2 up"))
-      ->capture_default_str();
-  verb.add_option("--points", o.points, "points")
-      ->type_name("M")
-      ->check(whole_number_from(1, "a whole number from 1 up"))
-      ->capture_default_str();
-  verb.add_option("--mean-track", o.mean_track, "observations of a point, on average")
-      ->type_name("T")
-      ->check(number_in(2, most, true, "a number from 2 up"))
-      ->capture_default_str();
-  noise("--pixel-noise", o.pixel_noise_px, "standard deviation of the measurements, pixels");
-  noise("--rotation-noise", o.rotation_noise_rad, "of the start's rotations, radians");
-  noise("--center-noise", o.center_noise,
-        "of the start's camera centres, scene units (cameras stand about 1 apart)");
-  noise("--point-noise", o.point_noise, "of the start's points, scene units");
-  noise("--focal-noise", o.focal_noise, "of the start's focal lengths, relative");
-  verb.add_option("--seed", o.seed, "the same seed gives the same bytes on every machine")
-      ->type_name("S")
-      ->check(whole_number_from(0, "a whole number from 0 up"))
-      ->capture_default_str();
+std::vector<BoundOption> options_of(FamilyArguments& arguments) {
+  using F = FieldsOf<FamilyArguments>;
+  const std::vector<std::string> noises = {"rotation-noise", "center-noise", "point-noise",
+                                           "focal-noise"};
+  std::vector<std::string> stated = {"cameras", "points", "mean-track", "family"};
+  stated.insert(stated.end(), noises.begin(), noises.end());
+  return bound<FamilyArguments>(
+      {F::text(&FamilyArguments::like,
+               {.name = "like",
+                .placeholder = "NAME",
+                .help = "family and size of a published problem, as ladybug-1723, trafalgar-257, "
+                        "dubrovnik-356, venice-1778 or final-13682; all is synthetic",
+                .excludes = stated}),
+       F::name(&FamilyArguments::family,
+               {{"street", "a car's images, with loops"},
+                {"collection", "photographs of popular spots"}},
+               {.name = "family",
+                .placeholder = "NAME",
+                .nothing = true,
+                .help = "instead of a lakeside",
+                .excludes = noises}),
+       F::real(&FamilyArguments::outliers,
+               {.name = "outliers",
+                .placeholder = "F",
+                .range = between(0, 1),
+                .help = "with --like and --family: fraction of the measurements that are wrong"}),
+       F::real(&FamilyArguments::drift,
+               {.name = "drift",
+                .placeholder = "S",
+                .range = between(0, 100),
+                .help = "with --like and --family: size of the start's errors, 0 for none"})},
+      arguments);
 }
 
-void add_family_options(CLI::App& verb, FamilyArguments& a) {
-  CLI::Option* like =
-      verb.add_option("--like", a.like,
-                      "family and size of a published problem, as ladybug-1723, trafalgar-257, "
-                      "dubrovnik-356, venice-1778 or final-13682; all is synthetic")
-          ->type_name("NAME");
-  CLI::Option* family =
-      verb.add_option("--family", a.family,
-                      "street (a car's images, with loops) or collection (photographs of popular "
-                      "spots), instead of a lakeside")
-          ->type_name("NAME")
-          ->check(one_of({"street", "collection"}));
-  for (const char* name : {"--cameras", "--points", "--mean-track"})
-    like->excludes(verb.get_option(name));
-  like->excludes(family);
-  for (const char* name : {"--rotation-noise", "--center-noise", "--point-noise", "--focal-noise"})
-    for (CLI::Option* option : {like, family}) option->excludes(verb.get_option(name));
-  verb.add_option("--outliers", a.outliers,
-                  "with --like and --family: fraction of the measurements that are wrong")
-      ->type_name("F")
-      ->check(number_in(0, 1, true, "a number from 0 to 1"))
-      ->capture_default_str();
-  verb.add_option("--drift", a.drift,
-                  "with --like and --family: size of the start's errors, 0 for none")
-      ->type_name("S")
-      ->check(number_in(0, 100, true, "a number from 0 to 100"))
-      ->capture_default_str();
-}
-
-void add_lens_options(CLI::App& verb, LensArguments& a) {
-  std::vector<std::string> names;
+std::vector<BoundOption> options_of(LensArguments& arguments) {
+  using F = FieldsOf<LensArguments>;
+  std::vector<OptionChoice> models;
   for (std::size_t m = 0; m < kCameraModels; ++m)
-    names.emplace_back(to_string(static_cast<CameraModel>(m)));
-  CLI::Option* camera =
-      verb.add_option("--camera", a.camera,
-                      "a scene through lenses of this model (docs/cameras.md), as OPENCV or EUCM; "
-                      "OUT is then the folder of a COLMAP model, unless its name has an extension")
-          ->type_name("MODEL")
-          ->check(one_of(names));
-  for (const char* name : {"--like", "--family", "--outliers", "--drift"})
-    camera->excludes(verb.get_option(name));
-  CLI::Option* shared =
-      verb.add_flag("--shared", a.shared, "with --camera: one lens for all images")->needs(camera);
-  verb.add_option("--lenses", a.lenses, "with --camera: so many lenses, which images take in turn")
-      ->type_name("N")
-      ->check(whole_number_from(1, "a whole number from 1 up"))
-      ->needs(camera)
-      ->excludes(shared);
-  verb.add_option(
-          "--field-of-view", a.field_of_view_deg,
-          "with --camera: full angle in degrees [65 for perspective models, 200 for fisheyes, "
-          "FOV and EUCM]")
-      ->type_name("DEGREES")
-      ->check(number_in(5, 220, true, "a number from 5 to 220"))
-      ->needs(camera);
+    models.push_back({std::string(to_string(static_cast<CameraModel>(m)))});
+  return bound<LensArguments>(
+      {F::name(
+           &LensArguments::camera, models,
+           {.name = "camera",
+            .placeholder = "MODEL",
+            .nothing = true,
+            .help = "a COLMAP model as OUT (unless its name has an extension) of a scene through "
+                    "lenses of this model (docs/cameras.md)",
+            .excludes = {"like", "family", "outliers", "drift"}}),
+       F::flag(&LensArguments::shared, {.name = "shared",
+                                        .help = "with --camera: one lens for all images",
+                                        .needs = {"camera"}}),
+       F::unless_zero(&LensArguments::lenses,
+                      {.name = "lenses",
+                       .placeholder = "N",
+                       .range = from(1),
+                       .help = "with --camera: so many lenses, which images take in turn",
+                       .needs = {"camera"},
+                       .excludes = {"shared"}}),
+       F::unless_zero(&LensArguments::field_of_view_deg,
+                      {.name = "field-of-view",
+                       .placeholder = "DEGREES",
+                       .unit = "deg",
+                       .range = between(5, 220),
+                       .help = "with --camera: full angle; not given: 65 for perspective models, "
+                               "200 for fisheyes, FOV and EUCM",
+                       .needs = {"camera"}})},
+      arguments);
 }
 
 LensSceneOptions lens_options(const LensArguments& a, const SceneOptions& scene) {

@@ -2,17 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "json_document.h"
+#include "options/option_field.h"
 #include "sheaf/scene.h"
 
 namespace sheaf {
-
-/// --cameras, --points, --mean-track, the noises and --seed.
-void add_scene_options(CLI::App& verb, SceneOptions& options);
 
 /// Scenes of a family; counts, pixel noise and seed are those of the SceneOptions.
 struct FamilyArguments {
@@ -22,8 +20,8 @@ struct FamilyArguments {
   bool chosen() const { return !like.empty() || !family.empty(); }
 };
 
-/// --like, --family, --outliers and --drift, after `add_scene_options`.
-void add_family_options(CLI::App& verb, FamilyArguments& arguments);
+/// --like, --family, --outliers and --drift.
+std::vector<BoundOption> options_of(FamilyArguments& arguments);
 
 /// Scenes through lenses of a model; counts, noises and seed are those of the SceneOptions.
 struct LensArguments {
@@ -34,8 +32,8 @@ struct LensArguments {
   bool chosen() const { return !camera.empty(); }
 };
 
-/// --camera, --shared, --lenses and --field-of-view, after the others.
-void add_lens_options(CLI::App& verb, LensArguments& arguments);
+/// --camera, --shared, --lenses and --field-of-view.
+std::vector<BoundOption> options_of(LensArguments& arguments);
 LensSceneOptions lens_options(const LensArguments& arguments, const SceneOptions& scene);
 /// `null`s where no such scene was asked for.
 Json lens_json(const LensArguments& arguments);

@@ -10,10 +10,10 @@
 #include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
+#include "options/solve_options.h"
 #include "outputs.h"
 #include "progress.h"
 #include "sheaf/sheaf.h"
-#include "solve_arguments.h"
 #include "summary_text.h"
 #include "timer.h"
 #include "verb.h"
@@ -40,7 +40,7 @@ Problem state_of(const Problem& problem) {
 // Says what --fix and --refine leave where it is; nothing where nothing was asked for.
 std::string hold(const RefinementArguments& arguments, const Problem& problem, Fixed& fixed) {
   if (!arguments.given()) return "";
-  const Refinement refinement = refinement_of(arguments, problem);
+  const Refinement refinement = refinement_of(arguments, problem).value();
   fixed = fixed_of(refinement, problem);
   return fmt::format("held        {}\n", held_text(refinement, problem));
 }
@@ -63,7 +63,7 @@ std::vector<std::string> write_results(const Arguments& arguments, Problem befor
   return written;
 }
 
-int run(const Arguments& arguments) {
+int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const bool wants_json = !arguments.common.json.empty();
@@ -73,7 +73,7 @@ int run(const Arguments& arguments) {
   Problem& problem = input.problem;
 
   SolveRecord record;
-  record.arguments = arguments.solve;
+  record.options = options_json(options_of(arguments.solve));
   record.read_s = input.read_s;
   if (wants_json) {
     record.input = input_json(arguments.in, input);
@@ -82,7 +82,7 @@ int run(const Arguments& arguments) {
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
 
   Progress progress(arguments.common.quiet);
-  SolveOptions options = solve_options(arguments.solve);
+  SolveOptions options = arguments.solve.options;
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
   options.threads = arguments.common.threads;
   options.lend_observations = true;
@@ -120,24 +120,27 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_solve(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand("solve", "refine camera poses, intrinsics and points");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  verb.add_option("-o,--output", arguments->out,
-                  std::string("write the refined problem; ") + kProblemOut)
-      ->type_name("OUT");
-  verb.add_option("--ply", arguments->ply, "write start (grey) and result (colour) as one PLY")
-      ->type_name("FILE");
-  add_solve_options(verb, arguments->solve);
-  add_common_options(verb, arguments->common);
-  verb.footer(
-      "Example:\n  sheaf solve problem.txt -o refined.txt --json summary.json\n"
-      "\nA COLMAP model, its first image in place and the principal point refined too:\n"
-      "  sheaf solve model -o refined --fix pose=IMG_0001.jpg --refine pp\n"
-      "\nOnly a new image's pose, all else as it is:\n"
-      "  sheaf solve model -o refined --fix points,poses,intrinsics --refine pose=new.jpg");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb solve_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"solve", "refine camera poses, intrinsics and points",
+            "Example:\n  sheaf solve problem.txt -o refined.txt --json summary.json\n"
+            "\nA COLMAP model, its first image in place and the principal point refined too:\n"
+            "  sheaf solve model -o refined --fix pose=IMG_0001.jpg --refine pp\n"
+            "\nOnly a new image's pose, all else as it is:\n"
+            "  sheaf solve model -o refined --fix points,poses,intrinsics --refine pose=new.jpg"};
+  verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
+  verb.options = joined(
+      {bound<Arguments>({F::text(&Arguments::out,
+                                 {.name = "output",
+                                  .placeholder = "OUT",
+                                  .help = std::string("write the refined problem; ") + kProblemOut,
+                                  .short_name = "o"}),
+                         F::text(&Arguments::ply, ply_of_two_states())},
+                        *a),
+       own(options_of(a->solve)), options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -95,8 +94,8 @@ void write_plot(const Arguments& arguments, const ComparisonRecord& record,
   file.value().commit().value();
 }
 
-Json list_json(const std::vector<std::string>& lists) {
-  return lists.empty() ? Json() : Json(fmt::format("{}", fmt::join(lists, ",")));
+Json list_json(const std::vector<std::string>& items) {
+  return items.empty() ? Json() : Json(text_of(items));
 }
 
 Json document_of(const Arguments& arguments, const Json& input, const SolverList& solvers,
@@ -133,7 +132,7 @@ void print(const Arguments& arguments, const Problem& problem, const SolverList&
       arguments.limits.max_iterations, arguments.limits.time_s);
   if (arguments.limits.refinement.given())
     fmt::print("held: {}\n",
-               held_text(refinement_of(arguments.limits.refinement, problem), problem));
+               held_text(refinement_of(arguments.limits.refinement, problem).value(), problem));
   fmt::print("best cost {:.10g}\n\n{}", record.best, comparison_text(record));
   if (arguments.steps) fmt::print("\n{}\n", steps_table(record));
   for (const MissingSolver& solver : solvers.missing)
@@ -152,7 +151,7 @@ int run(const Arguments& arguments) {
   if (!arguments.reference.empty()) reference = read(arguments.reference).value();
   const char* folders = std::getenv("SHEAF_PEERS");
   const Fixed fixed =
-      fixed_of(refinement_of(arguments.limits.refinement, input.problem), input.problem);
+      fixed_of(refinement_of(arguments.limits.refinement, input.problem).value(), input.problem);
   const SolverList solvers = find_solvers(
       arguments.solvers, !arguments.peers.empty() || folders == nullptr ? arguments.peers : folders,
       input.problem, fixed);
@@ -181,73 +180,112 @@ int run(const Arguments& arguments) {
   return any ? 0 : static_cast<int>(ErrorCode::no_usable_step);
 }
 
-void add_compare_options(CLI::App& verb, Arguments& a) {
-  verb.add_option(
-          "--solvers", a.solvers,
-          "comma-separated NAME[:CONFIG]: sheaf (its CONFIG is a camera solver or "
-          "OPTION=VALUE of solve, joined by '+') and peers that are installed (ceres, g2o, "
-          "gtsam, ...; their CONFIGs are in bench/README.md) [sheaf and all that are found]")
-      ->type_name("LIST");
-  verb.add_option("--peers", a.peers,
-                  "more folders to find peers (programs peer-NAME) in, separated by colons "
-                  "[$SHEAF_PEERS]")
-      ->type_name("FOLDERS");
-  verb.add_option("--reference", a.reference, "truth to hold each result against, as evaluate does")
-      ->type_name("FILE");
-  verb.add_option("--max-iterations", a.limits.max_iterations, "steps of each solver, at most")
-      ->type_name("N")
-      ->check(whole_number_from(1, "a whole number from 1 up"))
-      ->capture_default_str();
-  verb.add_option("--time-limit", a.limits.time_s,
-                  "seconds of each solver; one that does not end by itself is killed later on")
-      ->type_name("SECONDS")
-      ->check(number_in(0, 1e6, false, "a number of seconds above 0"))
-      ->capture_default_str();
-  verb.add_option("--tolerance", a.limits.tolerance,
-                  "each solver ends after two accepted steps in a row that decrease the cost by "
-                  "less than this part of it")
-      ->type_name("T")
-      ->check(number_in(0, std::numeric_limits<double>::max(), true, "a number from 0 up"))
-      ->capture_default_str();
-  add_refinement_options(verb, a.limits.refinement,
-                         "what every solver holds (one that cannot is a row that says so)");
-  verb.add_flag(
-      "--own-lenses", a.own_lenses,
-      "give each image of a COLMAP model a lens f, k1, k2 of its own, as a BAL file states "
-      "it, so that peers that read those can take part");
-  verb.add_option("--time-to", a.taus, "times until the cost is within these parts of the best")
-      ->type_name("TAUS")
-      ->delimiter(',')
-      ->check(number_in(0, std::numeric_limits<double>::max(), false, "a number above 0"))
-      ->default_str("1e-1,1e-2,1e-3,1e-4,1e-6");
-  verb.add_option("--runs", a.runs, "runs of each, interleaved; the table shows the median one")
-      ->type_name("N")
-      ->check(whole_number_from(1, "a whole number from 1 up"))
-      ->capture_default_str();
-  verb.add_flag("--steps", a.steps,
-                "also a table of each step: seconds, chi2, which were rejected");
-  verb.add_option("--plot", a.plot, "cost against time, as SVG")->type_name("FILE");
+// "0.1,0.01": parts of the best cost.
+OptionField<Arguments> time_to_field() {
+  OptionSpec part{.name = "time-to", .range = above(0)};
+  part.kind = OptionKind::real;
+  OptionSpec spec{.name = "time-to",
+                  .placeholder = "TAUS",
+                  .help = "times until the cost is within these parts of the best",
+                  .wrong = [part](const std::string& text) {
+                    const Result<OptionValue> value = parse(part, text);
+                    return value.ok() ? std::string() : std::string(value.error().what());
+                  }};
+  return FieldsOf<Arguments>::made(
+      OptionKind::list, spec,
+      [](const Arguments& a) -> OptionValue {
+        std::vector<std::string> items;
+        for (const double tau : a.taus) items.push_back(text_of(tau));
+        return items;
+      },
+      [part](Arguments& a, const OptionValue& value) {
+        a.taus.clear();
+        for (const std::string& item : std::get<std::vector<std::string>>(value))
+          a.taus.push_back(std::get<double>(parse(part, item).value()));
+      });
+}
+
+OptionTable<RunLimits> limit_fields() {
+  using F = FieldsOf<RunLimits>;
+  return {F::whole(&RunLimits::max_iterations, {.name = "max-iterations",
+                                                .placeholder = "N",
+                                                .range = from(1),
+                                                .help = "steps of each solver, at most"}),
+          F::real(&RunLimits::time_s,
+                  {.name = "time-limit",
+                   .placeholder = "SECONDS",
+                   .unit = "s",
+                   .range = {.lowest = 0, .highest = 1e6, .above = true},
+                   .help = "of each solver; one that does not end by itself is killed later on"}),
+          F::real(&RunLimits::tolerance,
+                  {.name = "tolerance",
+                   .placeholder = "T",
+                   .range = from(0),
+                   .help = "each solver ends after two accepted steps in a row that decrease the "
+                           "cost by less than this part of it"})};
+}
+
+OptionTable<Arguments> solver_fields() {
+  using F = FieldsOf<Arguments>;
+  return {
+      F::text(&Arguments::solvers,
+              {.name = "solvers",
+               .placeholder = "LIST",
+               .help = "comma-separated NAME[:CONFIG]: sheaf (its CONFIG is a camera solver or "
+                       "OPTION=VALUE of solve, joined by '+') and peers that are installed "
+                       "(ceres, g2o, gtsam, ...; their CONFIGs are in bench/README.md) [sheaf and "
+                       "all that are found]"}),
+      F::text(&Arguments::peers,
+              {.name = "peers",
+               .placeholder = "FOLDERS",
+               .help = "more folders to find peers (programs peer-NAME) in, separated by colons "
+                       "[$SHEAF_PEERS]"}),
+      F::text(&Arguments::reference,
+              {.name = "reference",
+               .placeholder = "FILE",
+               .help = "truth to hold each result against, as evaluate does"})};
+}
+
+OptionTable<Arguments> run_fields() {
+  using F = FieldsOf<Arguments>;
+  return {F::flag(&Arguments::own_lenses,
+                  {.name = "own-lenses",
+                   .help = "give each image of a COLMAP model a lens f, k1, k2 of its own, as a "
+                           "BAL file states it, so that peers that read those can take part"}),
+          time_to_field(),
+          F::whole(&Arguments::runs,
+                   {.name = "runs",
+                    .placeholder = "N",
+                    .range = from(1),
+                    .help = "of each solver, interleaved; the table shows the median one"}),
+          F::flag(&Arguments::steps,
+                  {.name = "steps",
+                   .help = "also a table of each step: seconds, chi2, which were rejected"}),
+          F::text(&Arguments::plot,
+                  {.name = "plot", .placeholder = "FILE", .help = "cost against time, as SVG"})};
 }
 
 }  // namespace
 
-void add_compare(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb = *app.add_subcommand(
-      "compare", "solve a problem with every solver that is here, side by side");
-  verb.add_option("IN", arguments->in, kProblemIn)->type_name("FILE")->required();
-  add_compare_options(verb, *arguments);
-  add_common_options(verb, arguments->common);
-  verb.footer(
-      "Example:\n  sheaf compare problem.txt --solvers sheaf,sheaf:sparse --threads 1 --plot "
-      "compare.svg\n"
-      "\nWith every peer that is installed, and errors against a known truth:\n"
-      "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json\n"
-      "\nPoses and lenses alone, step by step:\n"
-      "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps\n"
-      "\nA COLMAP model with the lenses that its images share, beside COLMAP:\n"
-      "  sheaf compare model --solvers sheaf,colmap --runs 5");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb compare_verb() {
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"compare", "solve a problem with every solver that is here, side by side",
+            "Example:\n  sheaf compare problem.txt --solvers sheaf,sheaf:sparse --threads 1 --plot "
+            "compare.svg\n"
+            "\nWith every peer that is installed, and errors against a known truth:\n"
+            "  sheaf compare start.txt --reference truth.txt --runs 5 --json compare.json\n"
+            "\nPoses and lenses alone, step by step:\n"
+            "  sheaf compare start.txt --fix points --solvers sheaf,ceres,g2o --threads 1 --steps\n"
+            "\nA COLMAP model with the lenses that its images share, beside COLMAP:\n"
+            "  sheaf compare model --solvers sheaf,colmap --runs 5"};
+  verb.places = bound<Arguments>({FieldsOf<Arguments>::text(&Arguments::in, problem_in())}, *a);
+  const auto refinement =
+      refinement_fields("what every solver holds (one that cannot is a row that says so)");
+  verb.options = joined({bound(solver_fields(), *a), bound(limit_fields(), a->limits),
+                         bound(refinement, a->limits.refinement), bound(run_fields(), *a),
+                         options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

@@ -29,9 +29,8 @@ fs::path final_of(const RunSetting& setting) {
 /// One list each, so that an adapter need not collect them.
 void add_refinement(const RunSetting& setting, std::vector<std::string>& words) {
   const RefinementArguments& a = setting.limits.refinement;
-  for (const auto& [option, lists] : {std::pair{"--fix", a.fix}, {"--refine", a.refine}})
-    if (!lists.empty())
-      words.insert(words.end(), {option, fmt::format("{}", fmt::join(lists, ","))});
+  for (const auto& [option, items] : {std::pair{"--fix", a.fix}, {"--refine", a.refine}})
+    if (!items.empty()) words.insert(words.end(), {option, text_of(items)});
 }
 
 std::vector<std::string> sheaf_words(const SolverProgram& solver, const RunSetting& setting) {
@@ -150,7 +149,7 @@ void judge(const fs::path& final, const RunSetting& setting, SolverRun& run) {
   state.observation_image = problem.observation_image;
   state.observation_point = problem.observation_point;
   state.observation_xy = problem.observation_xy;
-  const Fixed fixed = fixed_of(refinement_of(setting.limits.refinement, problem), problem);
+  const Fixed fixed = fixed_of(refinement_of(setting.limits.refinement, problem).value(), problem);
   if (const std::string moved = what_moved(problem, state, fixed); !moved.empty()) {
     run.failed = "it moved " + moved + ", which it was to hold";
     return;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "compare/solver_programs.h"
-#include "refinement.h"
+#include "options/refinement.h"
 #include "report/comparison.h"
 #include "sheaf/io.h"
 #include "sheaf/stop.h"

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
+#include "options/option_field.h"
 #include "sheaf/photometric.h"
-#include "sheaf/scene.h"
 
 namespace sheaf {
 
@@ -15,14 +15,11 @@ struct PhotometricSceneArguments {
   PhotometricSceneOptions scene;
 };
 
-/// --photometric and what belongs to it, after `add_scene_options`: --cameras, --points and --seed
-/// count for both.
-void add_photometric_scene_options(CLI::App& verb, PhotometricSceneArguments& arguments);
+/// --photometric and what belongs to it.
+std::vector<BoundOption> options_of(PhotometricSceneArguments& arguments);
 
-/// Writes the scene into folders; returns the exit code. The counts and the seed are taken from
-/// `scene` where they were given.
-int generate_photometric(CLI::App& verb, PhotometricSceneArguments arguments,
-                         const SceneOptions& scene, const std::string& out,
+/// Writes the scene into folders; returns the exit code.
+int generate_photometric(const PhotometricSceneOptions& options, const std::string& out,
                          const std::string& truth, const std::string& json);
 
 }  // namespace sheaf

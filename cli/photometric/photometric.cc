@@ -7,7 +7,7 @@
 
 #include "exit_code.h"
 #include "interrupt.h"
-#include "photometric/photometric_arguments.h"
+#include "options/photometric_options.h"
 #include "photometric/photometric_document.h"
 #include "photometric/photometric_outputs.h"
 #include "progress.h"
@@ -52,17 +52,16 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
   return out;
 }
 
-int run(const Arguments& arguments) {
+int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   PhotometricOutputs outputs(arguments.outputs, arguments.common.json);
-  PhotometricFolder folder =
-      read_photometric(arguments.in, read_options(arguments.photometric.input)).value();
+  PhotometricFolder folder = read_photometric(arguments.in, arguments.photometric.read).value();
   std::optional<PoseErrors> before, after;
   if (!folder.given_poses.empty()) before = pose_errors(folder);
   PhotometricProblem& problem = folder.problem;
   Progress progress(arguments.common.quiet);
-  PhotometricOptions options = photometric_options(arguments.photometric);
+  PhotometricOptions options = arguments.photometric.options;
   options.threads = arguments.common.threads;
   options.stop = interrupt.token();
   options.on_iteration = [&](const Iteration& iteration) {
@@ -92,9 +91,10 @@ int run(const Arguments& arguments) {
   if (!outputs.pictures().empty())
     fmt::print("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
   if (!arguments.common.json.empty()) {
-    const PhotometricRecord record{arguments.in,       folder.format, arguments.photometric,
-                                   outputs.pictures(), folder.read_s, write_s,
-                                   total.seconds(),    before,        after};
+    const PhotometricRecord record{
+        arguments.in,       folder.format, options_json(options_of(arguments.photometric)),
+        outputs.pictures(), folder.read_s, write_s,
+        total.seconds(),    before,        after};
     write_json(photometric_json(record, summary, details, problem), arguments.common.json);
   }
   return exit_code_of(summary.solve.termination);
@@ -102,28 +102,28 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_photometric(CLI::App& app, int& exit_code) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App& verb =
-      *app.add_subcommand("photometric", "refine poses and points from the pixels of images");
-  verb.add_option("IN", arguments->in,
-                  "folder of images with poses and points, of RGB-D images with poses, or of a "
-                  "COLMAP model "
-                  "of pinholes (told by its files: docs/photometric.md)")
-      ->type_name("FOLDER")
-      ->required();
-  add_photometric_output_options(verb, arguments->outputs);
-  add_photometric_options(verb, arguments->photometric);
-  add_common_options(verb, arguments->common);
-  verb.footer(
-      "Example:\n  sheaf photometric scene -o refined --pictures pictures --ply refined.ply\n"
-      "\nRGB-D images, depths as measured, from coarse to fine:\n"
-      "  sheaf photometric rgbd --intrinsics 525,525,319.5,239.5 --fix points --levels 4 -o "
-      "refined\n"
-      "\nA COLMAP model with its images:\n"
-      "  sheaf photometric sparse/0 --images images -o refined\n"
-      "\nA scene to try it on:\n  sheaf generate scene --photometric");
-  verb.callback([arguments, &exit_code] { exit_code = run(*arguments); });
+Verb photometric_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"photometric", "refine poses and points from the pixels of images",
+            "Example:\n  sheaf photometric scene -o refined --pictures pictures --ply refined.ply\n"
+            "\nRGB-D images, depths as measured, from coarse to fine:\n"
+            "  sheaf photometric rgbd --intrinsics 525,525,319.5,239.5 --fix points --levels 4 -o "
+            "refined\n"
+            "\nA COLMAP model with its images:\n"
+            "  sheaf photometric sparse/0 --images images -o refined\n"
+            "\nA scene to try it on:\n  sheaf generate scene --photometric"};
+  verb.places = bound<Arguments>(
+      {F::text(&Arguments::in,
+               {.name = "IN",
+                .placeholder = "FOLDER",
+                .help = "folder of images with poses and points, of RGB-D images with poses, or of "
+                        "a COLMAP model of pinholes (told by its files: docs/photometric.md)"})},
+      *a);
+  verb.options =
+      joined({options_of(a->outputs), own(options_of(a->photometric)), options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
 }
 
 }  // namespace sheaf

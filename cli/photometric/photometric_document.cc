@@ -10,32 +10,6 @@
 namespace sheaf {
 namespace {
 
-Json options_json(const PhotometricArguments& a) {
-  Json options = photometric_input_json(a.input);
-  options.update({{"interpolation", a.interpolation},
-                  {"brightness", a.brightness},
-                  {"loss", a.loss},
-                  {"loss_on", a.loss_on},
-                  {"leaving", a.leaving},
-                  {"points", a.points},
-                  {"warp", a.warp},
-                  {"pattern", a.pattern},
-                  {"levels", a.levels},
-                  {"rounds", a.rounds},
-                  {"min_zncc", a.min_zncc},
-                  {"rows", a.rows},
-                  {"anchor_px", a.anchor_px > 0 ? number(a.anchor_px) : Json()},
-                  {"anchor_loss", a.anchor_loss},
-                  {"fix", a.fix.empty() ? Json() : Json(a.fix)},
-                  {"max_iterations", a.max_iterations},
-                  {"tolerance", a.tolerance},
-                  {"motion_px", number(a.motion_px)},
-                  {"time_limit_s", a.time_limit_s > 0 ? number(a.time_limit_s) : Json()},
-                  {"memory_limit_bytes", a.memory_limit_bytes},
-                  {"initial_damping", a.initial_damping}});
-  return options;
-}
-
 /// A number for each point: of its inverse depth, or the three of X, Y and Z together.
 std::vector<double> sigma_of_points(const PhotometricDetails& details) {
   if (details.of_inverse_depth) return details.sigma;
@@ -79,7 +53,7 @@ Json photometric_json(const PhotometricRecord& record, const PhotometricSummary&
         {"format", record.format},
         {"images", problem.images.size()},
         {"points", problem.num_points()}}},
-      {"options", options_json(record.arguments)},
+      {"options", record.options},
       {"solver", {{"name", s.solver}}},
       {"simd", s.simd},
       {"threads", s.threads},

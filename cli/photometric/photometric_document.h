@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "json_document.h"
-#include "photometric/photometric_arguments.h"
+#include "photometric/photometric_input.h"
 #include "sheaf/photometric.h"
 #include "sheaf/solve.h"
 
@@ -16,7 +16,7 @@ namespace sheaf {
 /// What the JSON of a photometric refinement is made of.
 struct PhotometricRecord {
   std::string in, format;
-  PhotometricArguments arguments;
+  Json options;
   std::vector<std::string> pictures;  ///< names in their folder
   double read_s = 0, write_s = 0, total_s = 0;
   std::optional<PoseErrors> before{}, after{};  ///< where poses were disturbed

@@ -11,20 +11,26 @@
 
 namespace sheaf {
 
-void add_photometric_output_options(CLI::App& verb, PhotometricOutputArguments& a) {
-  verb.add_option("-o,--output", a.out,
-                  "folder for the refined state in the same format, with brightness.txt, "
-                  "visibility.txt and sigma.txt")
-      ->type_name("FOLDER");
-  verb.add_option("--ply", a.ply,
-                  "also write start (grey) and result (in the images' colours), with cameras, as "
-                  "one PLY")
-      ->type_name("FILE");
-  verb.add_option(
-          "--pictures", a.pictures,
-          "folder for PNGs: the worst and the middle patches before and after, and a map of "
-          "residuals for each image")
-      ->type_name("FOLDER");
+std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments) {
+  using F = FieldsOf<PhotometricOutputArguments>;
+  return bound<PhotometricOutputArguments>(
+      {F::text(&PhotometricOutputArguments::out,
+               {.name = "output",
+                .placeholder = "FOLDER",
+                .help = "folder for the refined state in the same format, with brightness.txt, "
+                        "visibility.txt and sigma.txt",
+                .short_name = "o"}),
+       F::text(&PhotometricOutputArguments::ply,
+               {.name = "ply",
+                .placeholder = "FILE",
+                .help = "also write start (grey) and result (in the images' colours), with "
+                        "cameras, as one PLY"}),
+       F::text(&PhotometricOutputArguments::pictures,
+               {.name = "pictures",
+                .placeholder = "FOLDER",
+                .help = "folder for PNGs: the worst and the middle patches before and after, and a "
+                        "map of residuals for each image"})},
+      arguments);
 }
 
 PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& arguments,

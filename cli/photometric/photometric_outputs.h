@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "options/option_field.h"
 #include "report/patch_comparison.h"
 #include "sheaf/io.h"
 #include "sheaf/photometric.h"
@@ -17,7 +17,7 @@ namespace sheaf {
 struct PhotometricOutputArguments {
   std::string out, ply, pictures;
 };
-void add_photometric_output_options(CLI::App& verb, PhotometricOutputArguments& arguments);
+std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments);
 
 /// Holds what outputs need of the start until the result is there. Errors are thrown.
 class PhotometricOutputs {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "eliminate/kernel_table.h"
+#include "options/photometric_options.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "sheaf/solve.h"
@@ -237,6 +238,7 @@ Result<Pattern> check_photometric(const PhotometricProblem& problem,
                                   const PhotometricOptions& options) {
   const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
   if (Result<void> valid = validate(problem); !valid.ok()) return valid.error();
+  if (Result<void> fields = check_fields(options); !fields.ok()) return fields.error();
   const bool rays = uses_rays(problem, options);
   if (rays && !problem.has_hosts()) return usage("points on rays (inverse depth) need hosts");
   if (!rays && problem.patches.empty()) return usage("points as xyz need stored patches");
@@ -244,14 +246,11 @@ Result<Pattern> check_photometric(const PhotometricProblem& problem,
     return usage("a pyramid needs points on the rays of hosts: stored patches have one size only");
   if (!rays && options.warp == Warp::inverse_depth)
     return usage("the warp by inverse depth needs points on the rays of hosts");
-  if (options.levels < 1 || options.levels > 6) return usage("levels are 1 to 6");
-  if (options.rounds < 1) return usage("rounds are 1 or more");
   for (std::size_t i = 0; i < problem.images.size(); ++i)
     if (std::min(problem.images[i].width, problem.images[i].height) >> (options.levels - 1) < 16)
       return usage("image " + std::to_string(i) + " has fewer than 16 x 16 pixels at level " +
                    std::to_string(options.levels));
   if (Result<void> anchor = check_anchor(problem, options); !anchor.ok()) return anchor.error();
-  if (options.loss.graduated) return usage("graduated losses are not for photometric rows");
   if (!rays) return problem.patch;
   return make_pattern(options.pattern);
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "options/solve_options.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "scene/behind.h"
@@ -35,22 +36,9 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
     return usage("fixed parameters are given for " + std::to_string(sets) + " of " +
                  std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
-  if (options.max_iterations < 0) return usage("max_iterations is negative");
-  if (options.inner_iterations < 0) return usage("inner_iterations is negative");
-  if (!(options.tolerance >= 0)) return usage("tolerance is negative or not a number");
-  if (!(options.gradient_tolerance >= 0))
-    return usage("gradient_tolerance is negative or not a number");
-  if (!(options.time_limit_s >= 0)) return usage("time_limit_s is negative or not a number");
-  if (!(options.initial_damping >= 0)) return usage("initial_damping is negative or not a number");
-  if (options.threads < 0) return usage("threads is negative");
+  if (Result<void> fields = check_fields(options); !fields.ok()) return fields;
   if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz)
     return usage("the dogleg steps points by X, Y, Z: it takes no other parametrisation of points");
-  const Loss& loss = options.loss;
-  if (!(loss.scale_px >= 0 && std::isfinite(loss.scale_px)))
-    return usage("the scale of the loss is negative or not finite");
-  if (loss.graduated && is_convex(loss.kind))
-    return usage(std::string("the loss ") + to_string(loss.kind) +
-                 " is convex: there is nothing to graduate");
   return {};
 }
 

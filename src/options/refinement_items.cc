@@ -1,8 +1,7 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "refinement_items.h"
+#include "options/refinement_items.h"
 
-#include <fmt/format.h>
 #include <fnmatch.h>
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 #include <map>
 #include <optional>
 
-#include "sheaf/error.h"
+#include "options/words.h"
 
 namespace sheaf {
 namespace {
@@ -50,7 +49,7 @@ bool is_parameter(std::string_view name) {
   return false;
 }
 
-std::optional<RefinementItem> parse_item(const std::string& text) {
+std::optional<RefinementItem> read_item(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string_view name = std::string_view(text).substr(0, equals);
   RefinementItem item;
@@ -102,30 +101,24 @@ Named by_name(const std::string& who, const std::vector<std::string>& names) {
 }
 
 /// "1, 2, 5 and 7 more"
-template <class Entries>
-std::string some_of(const Entries& entries) {
+std::string some_of(std::vector<std::string> words) {
   constexpr std::size_t kShown = 5;
-  std::string out;
-  for (std::size_t i = 0; i < std::min(entries.size(), kShown); ++i)
-    out += fmt::format("{}{}", i == 0 ? "" : ", ", entries[i]);
-  if (entries.size() > kShown) out += fmt::format(" and {} more", entries.size() - kShown);
-  return out;
+  const std::size_t more = words.size() - std::min(words.size(), kShown);
+  words.resize(words.size() - more);
+  return listed(words) + (more > 0 ? " and " + std::to_string(more) + " more" : "");
 }
 
 std::string ids_text(const std::vector<std::uint32_t>& ids, std::size_t count) {
   if (count == 0) return "there are none";
-  return ids.empty() ? fmt::format("they are numbered 0 to {}", count - 1)
-                     : "there are " + some_of(ids);
+  if (ids.empty()) return "they are numbered 0 to " + std::to_string(count - 1);
+  std::vector<std::string> words;
+  for (const std::uint32_t id : ids) words.push_back(std::to_string(id));
+  return "there are " + some_of(std::move(words));
 }
 
 std::string names_text(const std::vector<std::string>& names) {
   return names.empty() ? std::string("the file does not name its images")
                        : "images are called " + some_of(names);
-}
-
-[[noreturn]] void refuse(const RefinementItem& item, const std::string& what) {
-  throw Error(ErrorCode::usage,
-              fmt::format("{} {}: {}", item.refine ? "--refine" : "--fix", item.text, what));
 }
 
 const SceneMetadata& metadata_of(const Problem& problem) {
@@ -135,29 +128,17 @@ const SceneMetadata& metadata_of(const Problem& problem) {
 
 }  // namespace
 
-std::vector<std::string> split_items(std::string_view list) {
-  std::vector<std::string> out(1);
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    if (list[i] == '\\' && i + 1 < list.size() && list[i + 1] == ',') {
-      out.back() += list[++i];
-    } else if (list[i] == ',') {
-      out.emplace_back();
-    } else {
-      out.back() += list[i];
-    }
-  }
-  return out;
+Result<RefinementItem> parse_item(const std::string& text, bool refine) {
+  std::optional<RefinementItem> item = read_item(text);
+  if (!item)
+    return Error(ErrorCode::usage, std::string("expected a comma-separated list of ") + kExpected +
+                                       "; not '" + text + "'");
+  item->refine = refine;
+  return *item;
 }
 
-std::string parse_items(const std::string& list, bool refine, std::vector<RefinementItem>& out) {
-  for (const std::string& text : split_items(list)) {
-    std::optional<RefinementItem> item = parse_item(text);
-    if (!item)
-      return fmt::format("expected a comma-separated list of {}; not '{}'", kExpected, text);
-    item->refine = refine;
-    out.push_back(std::move(*item));
-  }
-  return "";
+Error refusal_of(const RefinementItem& item, const std::string& what) {
+  return {ErrorCode::usage, (item.refine ? "--refine " : "--fix ") + item.text + ": " + what};
 }
 
 std::uint16_t parameters_of(const RefinementItem& item, CameraModel model) {
@@ -173,31 +154,31 @@ std::uint16_t parameters_of(const RefinementItem& item, CameraModel model) {
   return static_cast<std::uint16_t>(bits);
 }
 
-Named images_named(const RefinementItem& item, const Problem& problem) {
+Result<Named> images_named(const RefinementItem& item, const Problem& problem) {
   const SceneMetadata& metadata = metadata_of(problem);
   Named named = by_name(item.who, metadata.image_names);
   if (!named.indices.empty()) return named;
   if (const auto index = index_of(item.who, metadata.image_ids, problem.num_images()))
-    return {{*index}, false};
+    return Named{{*index}, false};
   std::uint32_t ignored = 0;
   if (parse_id(item.who, ignored) || metadata.image_names.empty())
-    refuse(item, fmt::format("no image has the id or name {}; of ids, {}; {}", item.who,
-                             ids_text(metadata.image_ids, problem.num_images()),
-                             names_text(metadata.image_names)));
-  refuse(item,
-         fmt::format("no image is called {}; {}", item.who, names_text(metadata.image_names)));
+    return refusal_of(item, "no image has the id or name " + item.who + "; of ids, " +
+                                ids_text(metadata.image_ids, problem.num_images()) + "; " +
+                                names_text(metadata.image_names));
+  return refusal_of(item,
+                    "no image is called " + item.who + "; " + names_text(metadata.image_names));
 }
 
-Named lenses_named(const RefinementItem& item, const Problem& problem) {
+Result<Named> lenses_named(const RefinementItem& item, const Problem& problem) {
   const SceneMetadata& metadata = metadata_of(problem);
   if (const auto index = index_of(item.who, metadata.camera_ids, problem.cameras.size()))
-    return {{*index}, false};
+    return Named{{*index}, false};
   Named named = by_name(item.who, metadata.image_names);
   if (named.indices.empty())
-    refuse(item, fmt::format("no camera has the id {0}, and no image is called {0}; of cameras, "
-                             "{1}; {2}",
-                             item.who, ids_text(metadata.camera_ids, problem.cameras.size()),
-                             names_text(metadata.image_names)));
+    return refusal_of(item, "no camera has the id " + item.who + ", and no image is called " +
+                                item.who + "; of cameras, " +
+                                ids_text(metadata.camera_ids, problem.cameras.size()) + "; " +
+                                names_text(metadata.image_names));
   for (std::uint32_t& index : named.indices) index = problem.image_camera[index];
   std::sort(named.indices.begin(), named.indices.end());
   named.indices.erase(std::unique(named.indices.begin(), named.indices.end()), named.indices.end());

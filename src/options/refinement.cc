@@ -1,8 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "refinement.h"
-
-#include <fmt/format.h>
+#include "options/refinement.h"
 
 #include <algorithm>
 #include <array>
@@ -13,9 +11,8 @@
 #include <string_view>
 #include <utility>
 
-#include "refinement_items.h"
-#include "sheaf/error.h"
-#include "verb.h"
+#include "options/refinement_items.h"
+#include "options/words.h"
 
 namespace sheaf {
 namespace {
@@ -65,29 +62,30 @@ std::vector<std::uint32_t> lenses_of(const std::vector<std::uint32_t>& images,
   return {lenses.begin(), lenses.end()};
 }
 
-void refuse_absent_parameter(const RefinementItem& item, const Problem& problem,
-                             const std::vector<std::uint32_t>& lenses) {
+Error absent_parameter(const RefinementItem& item, const Problem& problem,
+                       const std::vector<std::uint32_t>& lenses) {
   std::set<std::string> known;
   for (const std::uint32_t c : lenses) {
     const CameraModel model = problem.cameras[c].model;
-    const std::vector<std::string_view> names = parameter_names(model);
-    known.insert(fmt::format("{} has {}", to_string(model), fmt::join(names, ", ")));
+    known.insert(std::string(to_string(model)) + " has " + listed(parameter_names(model)));
   }
-  throw Error(ErrorCode::usage,
-              fmt::format("{} {}: no camera that is meant has this parameter; {}",
-                          item.refine ? "--refine" : "--fix", item.text, fmt::join(known, "; ")));
+  std::string models;
+  for (const std::string& model : known) models += "; " + model;
+  return refusal_of(item, "no camera that is meant has this parameter" + models);
 }
 
-Resolved resolve(const RefinementItem& item, const Problem& problem) {
+Result<Resolved> resolve(const RefinementItem& item, const Problem& problem) {
   Resolved out;
   out.item = &item;
-  Named named;
+  Result<Named> found = Named();
   const bool by_image = item.part == Part::poses || item.part == Part::image;
   if (item.who.empty()) {
-    named.indices = all(by_image ? problem.num_images() : problem.cameras.size());
+    found.value().indices = all(by_image ? problem.num_images() : problem.cameras.size());
   } else {
-    named = by_image ? images_named(item, problem) : lenses_named(item, problem);
+    found = by_image ? images_named(item, problem) : lenses_named(item, problem);
   }
+  if (!found.ok()) return found.error();
+  const Named& named = found.value();
   out.narrowness = narrowness(item, named.pattern);
   out.points = item.part == Part::points;
   if (by_image) out.images = named.indices;
@@ -99,7 +97,7 @@ Resolved resolve(const RefinementItem& item, const Problem& problem) {
     out.lenses.emplace_back(c, bits[model_number(problem, c)]);
     any |= out.lenses.back().second;
   }
-  if (any == 0 && item.part == Part::parameter) refuse_absent_parameter(item, problem, lenses);
+  if (any == 0 && item.part == Part::parameter) return absent_parameter(item, problem, lenses);
   return out;
 }
 
@@ -119,18 +117,20 @@ class Decisions {
   /// Later calls are narrower, or as narrow.
   void decide(std::size_t what, std::uint32_t by) {
     const std::uint32_t before = std::exchange(last_[what], by + 1);
-    if (before == 0) return;
+    if (before == 0 || !contradiction_.empty()) return;
     const Resolved &a = resolved_[before - 1], &b = resolved_[by];
     if (a.narrowness != b.narrowness || a.item->refine == b.item->refine) return;
-    throw Error(ErrorCode::usage, fmt::format("--fix {} and --refine {} contradict each other",
-                                              (b.item->refine ? a : b).item->text,
-                                              (b.item->refine ? b : a).item->text));
+    contradiction_ = "--fix " + (b.item->refine ? a : b).item->text + " and --refine " +
+                     (b.item->refine ? b : a).item->text + " contradict each other";
   }
+  /// The first, or "".
+  const std::string& contradiction() const { return contradiction_; }
 
  private:
   const std::vector<Resolved>& resolved_;
   std::size_t images_;
   std::vector<std::uint32_t> last_;  ///< 1 + index into resolved_; 0: nobody
+  std::string contradiction_;
 };
 
 Refinement by_default(const Problem& problem) {
@@ -165,63 +165,77 @@ void apply(const Resolved& resolved, std::uint32_t number, Decisions& decisions,
   }
 }
 
-std::vector<RefinementItem> parse_all(const RefinementArguments& a) {
+/// Broader ones first; what names as few in the order that they were given in.
+Result<std::vector<Resolved>> resolve_all(const std::vector<RefinementItem>& items,
+                                          const Problem& problem) {
+  std::vector<Resolved> out;
+  for (const RefinementItem& item : items) {
+    Result<Resolved> resolved = resolve(item, problem);
+    if (!resolved.ok()) return resolved.error();
+    out.push_back(std::move(resolved).value());
+  }
+  std::stable_sort(out.begin(), out.end(), [](const Resolved& a, const Resolved& b) {
+    return a.narrowness < b.narrowness;
+  });
+  return out;
+}
+
+Result<std::vector<RefinementItem>> parse_all(const RefinementArguments& a) {
   std::vector<RefinementItem> items;
   for (const bool refine : {false, true})
-    for (const std::string& list : refine ? a.refine : a.fix)
-      if (const std::string wrong = parse_items(list, refine, items); !wrong.empty())
-        throw Error(ErrorCode::usage, (refine ? "--refine: " : "--fix: ") + wrong);
+    for (const std::string& text : refine ? a.refine : a.fix) {
+      Result<RefinementItem> item = parse_item(text, refine);
+      if (!item.ok())
+        return Error(ErrorCode::usage,
+                     (refine ? "--refine: " : "--fix: ") + std::string(item.error().what()));
+      items.push_back(std::move(item).value());
+    }
   return items;
 }
 
-CLI::Validator list_of_items(bool refine) {
-  return CLI::Validator(
-      [refine](std::string& text) {
-        std::vector<RefinementItem> ignored;
-        return parse_items(text, refine, ignored);
-      },
-      "");
+OptionSpec item_spec(const char* name, const std::string& help, bool refine) {
+  return {.name = name,
+          .placeholder = "LIST",
+          .help = help,
+          .wrong = [refine](const std::string& text) {
+            const Result<RefinementItem> item = parse_item(text, refine);
+            return item.ok() ? std::string() : std::string(item.error().what());
+          }};
 }
 
 }  // namespace
 
-void add_refinement_options(CLI::App& verb, RefinementArguments& a, const std::string& of_fix) {
-  verb.add_option("--fix", a.fix,
-                  of_fix +
-                      ": a comma-separated list of points, poses, intrinsics, f, k (distortion), "
-                      "pp (principal point) or a parameter's name (fx, k1, ...); of named ones as "
-                      "pose=WHO, camera=WHO, image=WHO (both), f=WHO, ...; WHO is a camera's or "
-                      "image's id, an image's name, or a pattern as 'left/*'")
-      ->type_name("LIST")
-      ->allow_extra_args(false)
-      ->check(list_of_items(false));
-  verb.add_option(
-          "--refine", a.refine,
-          "likewise what moves besides, or of what --fix holds; by default all but pp. What "
-          "names fewer wins: --fix poses --refine pose=new.jpg")
-      ->type_name("LIST")
-      ->allow_extra_args(false)
-      ->check(list_of_items(true));
+OptionTable<RefinementArguments> refinement_fields(const std::string& of_fix) {
+  using F = FieldsOf<RefinementArguments>;
+  return {
+      F::list(&RefinementArguments::fix,
+              item_spec("fix",
+                        of_fix + ": a comma-separated list of points, poses, intrinsics, f, k "
+                                 "(distortion), pp (principal "
+                                 "point) or a parameter's name (fx, k1, ...); of named ones as "
+                                 "pose=WHO, camera=WHO, image=WHO (both), f=WHO, ...; WHO is a "
+                                 "camera's or image's id, an image's name, or a pattern as "
+                                 "'left/*'",
+                        false)),
+      F::list(&RefinementArguments::refine,
+              item_spec("refine",
+                        "likewise what moves besides, or of what --fix holds; by default all but "
+                        "pp. What names fewer wins: --fix poses --refine pose=new.jpg",
+                        true)),
+  };
 }
 
-std::vector<std::string> items_of(const std::vector<std::string>& lists) {
-  std::vector<std::string> out;
-  for (const std::string& list : lists)
-    for (std::string& item : split_items(list)) out.push_back(std::move(item));
-  return out;
-}
-
-Refinement refinement_of(const RefinementArguments& arguments, const Problem& problem) {
+Result<Refinement> refinement_of(const RefinementArguments& arguments, const Problem& problem) {
   Refinement out = by_default(problem);
   if (!arguments.given()) return out;
-  const std::vector<RefinementItem> items = parse_all(arguments);
-  std::vector<Resolved> resolved;
-  for (const RefinementItem& item : items) resolved.push_back(resolve(item, problem));
-  std::stable_sort(resolved.begin(), resolved.end(), [](const Resolved& a, const Resolved& b) {
-    return a.narrowness < b.narrowness;
-  });
-  Decisions decisions(problem, resolved);
-  for (std::uint32_t i = 0; i < resolved.size(); ++i) apply(resolved[i], i, decisions, out);
+  const Result<std::vector<RefinementItem>> items = parse_all(arguments);
+  if (!items.ok()) return items.error();
+  const Result<std::vector<Resolved>> resolved = resolve_all(items.value(), problem);
+  if (!resolved.ok()) return resolved.error();
+  Decisions decisions(problem, resolved.value());
+  for (std::uint32_t i = 0; i < resolved.value().size(); ++i)
+    apply(resolved.value()[i], i, decisions, out);
+  if (!decisions.contradiction().empty()) return Error(ErrorCode::usage, decisions.contradiction());
   return out;
 }
 
@@ -243,7 +257,8 @@ std::string held_text(const Refinement& refinement, const Problem& problem) {
   if (!refinement.points) parts.emplace_back("points");
   const auto held = std::count(refinement.poses.begin(), refinement.poses.end(), char{0});
   if (held > 0)
-    parts.push_back(fmt::format("poses of {} of {} images", held, problem.num_images()));
+    parts.push_back("poses of " + std::to_string(held) + " of " +
+                    std::to_string(problem.num_images()) + " images");
   std::map<std::string, std::size_t> lenses;
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     std::vector<std::string_view> names = parameter_names(problem.cameras[c].model);
@@ -253,12 +268,15 @@ std::string held_text(const Refinement& refinement, const Problem& problem) {
     if (names.size() == count) {
       ++lenses["all"];
     } else if (!names.empty()) {
-      ++lenses[fmt::format("{}", fmt::join(names, ", "))];
+      ++lenses[listed(names)];
     }
   }
   for (const auto& [names, count] : lenses)
-    parts.push_back(fmt::format("{} of {} of {} lenses", names, count, problem.cameras.size()));
-  return fmt::format("{}", fmt::join(parts, "; "));
+    parts.push_back(names + " of " + std::to_string(count) + " of " +
+                    std::to_string(problem.cameras.size()) + " lenses");
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
+  return out;
 }
 
 }  // namespace sheaf

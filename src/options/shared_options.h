@@ -1,0 +1,64 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "options/option_field.h"
+
+namespace sheaf {
+
+/// What several structs of options have under the same name and with the same words.
+template <class Options>
+struct SharedFields {
+  using F = FieldsOf<Options>;
+  using Field = OptionField<Options>;
+
+  static Field max_iterations() {
+    return F::whole(&Options::max_iterations, {.name = "max-iterations",
+                                               .placeholder = "N",
+                                               .range = from(0),
+                                               .help = "steps to try, rejected ones included"});
+  }
+  static Field tolerance() {
+    return F::real(&Options::tolerance,
+                   {.name = "tolerance",
+                    .placeholder = "T",
+                    .range = from(0),
+                    .help = "stop when the relative decrease of the cost stays below this twice"});
+  }
+  static Field time_limit() {
+    return F::limit(&Options::time_limit_s,
+                    {.name = "time-limit",
+                     .placeholder = "SECONDS",
+                     .unit = "s",
+                     .range = above(0),
+                     .help = "stop after this long, set-up included, write the best state and exit "
+                             "with 130"});
+  }
+  /// `how` says what is done about a forecast over the limit.
+  static Field memory_limit(const std::string& how) {
+    return F::bytes(&Options::memory_limit_bytes,
+                    {.name = "memory-limit",
+                     .placeholder = "BYTES",
+                     .range = from(0),
+                     .help = how + " rather than exceed this; units K, M, G are powers of 1024; 0: "
+                                   "no limit"});
+  }
+  static Field initial_damping() {
+    return F::real(&Options::initial_damping, {.name = "initial-damping",
+                                               .placeholder = "LAMBDA",
+                                               .range = from(0),
+                                               .help = "of the first step; 0: chosen by rule"});
+  }
+  static Field threads() {
+    return F::whole(&Options::threads,
+                    {.name = "threads",
+                     .placeholder = "N",
+                     .range = from(0),
+                     .help = "threads to compute with, 0 for all; the result does not depend on it",
+                     .reach = OptionReach::every_verb});
+  }
+};
+
+}  // namespace sheaf
