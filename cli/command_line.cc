@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "options/options_page.h"
 #include "sheaf/error.h"
 
 namespace sheaf {
@@ -79,6 +80,13 @@ void add_verb(CLI::App& app, const Verb& verb, int& exit_code) {
   added.callback([&verb, &exit_code] { exit_code = verb.run(); });
 }
 
+/// On stdout, as --version is; its end of line is added there.
+void print_options() {
+  std::string page = options_page();
+  page.pop_back();
+  throw CLI::CallForVersion(page, 0);
+}
+
 // Of the verb that was named, so that a message says where it comes from.
 std::string name_of(const CLI::App& app) {
   const auto verbs = app.get_subcommands();
@@ -109,6 +117,9 @@ int run_command_line(int argc, char** argv, const std::vector<Verb>& verbs) {
   CLI::App app("Sheaf: a bundle adjustment engine.");
   app.name("sheaf");
   app.set_version_flag("--version", "sheaf " SHEAF_VERSION);
+  app.add_flag_callback("--options", print_options,
+                        "Print the page of all options of solve and photometric (docs/options.md) "
+                        "and exit");
   app.require_subcommand(1);
   app.footer("Each verb explains itself: sheaf solve --help\nTo begin: sheaf demo");
   int exit_code = 0;

@@ -34,6 +34,20 @@ std::set<std::string> documented(const std::string& section) {
   return keys;
 }
 
+// Keys of the options of a verb, in the second column of the tables of docs/options.md.
+std::set<std::string> documented_options(const std::string& verb) {
+  std::istringstream document(contents_of(std::string(SHEAF_SOURCE_DIR) + "/docs/options.md"));
+  std::set<std::string> keys;
+  const std::regex row(R"(\| `--[^`]+` \| `([^`]+)` \|.*)");
+  bool inside = false;
+  for (std::string line; std::getline(document, line);) {
+    if (line.rfind("## ", 0) == 0) inside = line == "## " + verb;
+    if (std::smatch match; inside && std::regex_match(line, match, row))
+      keys.insert("options." + match[1].str());
+  }
+  return keys;
+}
+
 bool has_keys(const json& value, const std::set<std::string>& keys) {
   std::set<std::string> found;
   for (const auto& [name, ignored] : value.items()) found.insert(name);
@@ -85,7 +99,10 @@ class JsonTest : public testing::Test {
   // Every key that is documented is there, and the other way round.
   void expect_documented(const std::string& verb, const std::vector<std::string>& sections) {
     std::set<std::string> keys;
-    for (const std::string& section : sections) keys.merge(documented(section));
+    for (const std::string& section : sections) {
+      keys.merge(documented(section));
+      keys.merge(documented_options(section));
+    }
     EXPECT_GT(keys.size(), 5u);
     EXPECT_EQ(produced(json_of(folder_ / (verb + ".json"))), keys);
   }
@@ -193,6 +210,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                 .exit_code,
             0);
   const json s = json_of(folder_ / "s.json");
+  EXPECT_EQ(documented_options("solve").size(), s["options"].size());
   EXPECT_EQ(s["options"], (json{{"max_iterations", 7},
                                 {"tolerance", 1e-12},
                                 {"time_limit_s", 60.0},
