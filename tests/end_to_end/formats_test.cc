@@ -123,9 +123,7 @@ TEST_F(FormatsCommand, RefusesWithTheRightExitCodes) {
   write(wide, folder_ / "wide/").value();
   EXPECT_EQ(run({"info", "wide"}).exit_code, 0);
   EXPECT_EQ(run({"solve", "wide", "-o", "refined/"}).exit_code, 0);
-  const Outcome refused = run({"solve", "wide", "--trust-region", "dogleg"});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.err.find("the dogleg is for BAL"), std::string::npos) << refused.err;
+  EXPECT_EQ(run({"solve", "wide", "--trust-region", "dogleg"}).exit_code, 0);
 }
 
 }  // namespace
