@@ -143,6 +143,7 @@ Table limit_fields() {
           Shared::tolerance(),
           motion,
           Shared::time_limit(),
+          Shared::solver("dense or sparse, by size", "conjugate gradients, as iterative-explicit"),
           Shared::memory_limit("refuse (exit 5)"),
           Shared::initial_damping(),
           Shared::threads()};

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "options/option_field.h"
+#include "sheaf/camera_solver_kind.h"
 
 namespace sheaf {
 
@@ -44,6 +45,19 @@ struct SharedFields {
                      .range = from(0),
                      .help = how + " rather than exceed this; units K, M, G are powers of 1024; 0: "
                                    "no limit"});
+  }
+  /// What the names mean that leave something to choose.
+  static Field solver(const std::string& automatic, const std::string& iterative) {
+    using Kind = CameraSolverKind;
+    return F::choice(
+        &Options::solver,
+        {{Kind::automatic, "auto", automatic},
+         {Kind::dense, "dense", "formed, Cholesky"},
+         {Kind::sparse, "sparse", "formed by blocks, Cholesky in an order that keeps fill low"},
+         {Kind::iterative, "iterative", iterative},
+         {Kind::iterative_explicit, "iterative-explicit", "on the formed blocks"},
+         {Kind::iterative_implicit, "iterative-implicit", "with nothing formed"}},
+        {.name = "solver", .placeholder = "NAME", .help = "how the camera system is solved"});
   }
   static Field initial_damping() {
     return F::real(&Options::initial_damping, {.name = "initial-damping",

@@ -42,17 +42,7 @@ Table model_fields() {
 /// How steps are computed.
 Table solver_fields() {
   return {
-      F::choice(
-          &SolveOptions::solver,
-          {{CameraSolverKind::automatic, "auto", "by counted work"},
-           {CameraSolverKind::dense, "dense", "formed, Cholesky"},
-           {CameraSolverKind::sparse, "sparse",
-            "formed by blocks, Cholesky in an order that keeps fill low"},
-           {CameraSolverKind::iterative, "iterative",
-            "conjugate gradients, one of the next two by counted work"},
-           {CameraSolverKind::iterative_explicit, "iterative-explicit", "on the formed blocks"},
-           {CameraSolverKind::iterative_implicit, "iterative-implicit", "with nothing formed"}},
-          {.name = "solver", .placeholder = "NAME", .help = "how the camera system is solved"}),
+      Shared::solver("by counted work", "conjugate gradients, one of the next two by counted work"),
       F::choice(
           &SolveOptions::precision,
           {{Precision::automatic, "auto", "mixed where it is quicker and ends where double does"},

@@ -29,6 +29,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "photometric")
     options.insert({"--output",
                     "--ply",
+                    "--solver",
                     "--pictures",
                     "--memory-limit",
                     "--intrinsics",
