@@ -290,7 +290,7 @@ void list_all_pairs(const Batches& batches, std::uint32_t num_images, Chunks& ou
                          &Chunk::end_pair_run, threads, [&](std::size_t c, PairRun* to) {
                            std::optional<Scratch>& mine = of_worker[threads.worker()];
                            if (!mine)
-                             mine.emplace(Runs(out.tiles.size()), Buffer<std::uint32_t>(most));
+                             mine = Scratch{Runs(out.tiles.size()), Buffer<std::uint32_t>(most)};
                            return list_pairs(batches, numbers, out.chunks[c], mine->runs,
                                              mine->tile_of, before[c], out.pairs.data(), to);
                          });
