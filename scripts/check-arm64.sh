@@ -93,8 +93,10 @@ generate() {  # NAME OPTION...
 refine() {  # VERB PROBLEM OPTION...
   local in=$2
   [ -e "$in" ] || in=$work/avx2/$2
-  here "$1" "$in" -o "$work/avx2/out" --simd avx2 "${@:3}"
-  there "$1" "$in" -o "$work/neon/out" --simd neon "${@:3}"
+  local avx2=(--simd avx2) neon=(--simd neon)
+  [ "$1" = photometric ] && avx2=() neon=()  # which has no such option, and one order of sums
+  here "$1" "$in" -o "$work/avx2/out" "${avx2[@]}" "${@:3}"
+  there "$1" "$in" -o "$work/neon/out" "${neon[@]}" "${@:3}"
   same "$1 ${2##*/} ${*:3}" out
   rm -rf "$work"/*/out
 }

@@ -63,12 +63,14 @@ DoglegStep best_in_plane(const DoglegPlane& plane, double radius) {
   const double h22 = (plane.nHn - 2 * along * plane.vHn / v + along * along * h11) / across2;
   // (H + sigma I) x = g with the least sigma >= 0 that keeps |x| within the radius.
   double low = 0, high = 0, x1 = 0, x2 = 0;
+  // The bits of std::hypot depend on the processor.
+  const auto length = [](double x, double y) { return std::sqrt(x * x + y * y); };
   const auto outside = [&](double sigma) {
     const double a = h11 + sigma, b = h22 + sigma, determinant = a * b - h12 * h12;
     x1 = (g1 * b - g2 * h12) / determinant, x2 = (a * g2 - h12 * g1) / determinant;
-    return !(a > 0 && determinant > 0 && std::hypot(x1, x2) <= radius);
+    return !(a > 0 && determinant > 0 && length(x1, x2) <= radius);
   };
-  high = std::hypot(g1, g2) / radius;
+  high = length(g1, g2) / radius;
   for (int i = 0; i < 100 && outside(high); ++i) high *= 2;
   for (int i = 0; i < 100 && outside(low); ++i) {
     const double middle = (low + high) / 2;
