@@ -232,7 +232,7 @@ Buffer<Run> list_runs(std::vector<Chunk>& chunks, const std::vector<std::uint64_
   std::vector<Buffer<Run>> parts((chunks.size() + kChunks - 1) / kChunks);
   threads.for_ranges(chunks.size(), kChunks, [&](std::size_t c, std::size_t last) {
     Buffer<Run>& part = parts[c / kChunks];
-    part.allocate(std::min(items[last] - items[c], keys * (last - c)));
+    part.allocate(std::min<std::size_t>(items[last] - items[c], keys * (last - c)));
     for (Run* to = part.data(); c < last; ++c) {
       chunks[c].*first = static_cast<std::uint64_t>(to - part.data());
       to = list(c, to);
