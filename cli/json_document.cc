@@ -28,6 +28,8 @@ Json iteration_json(const Iteration& it) {
           {"gain_ratio", number(it.gain_ratio)},
           {"gradient_max", number(it.gradient_max)},
           {"step_norm", number(it.step_norm)},
+          {"scale_px", it.scale_px > 0 ? number(it.scale_px) : Json()},
+          {"loss_floor", number(it.loss_floor)},
           {"linear_iterations", it.linear_iterations},
           {"time_s", number(it.time_s)}};
 }

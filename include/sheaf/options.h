@@ -68,6 +68,7 @@ struct SolveOptions {
   double initial_damping = 0;                  ///< lambda of the first step; 0: the default rule
   /// At most so many Gauss-Newton steps of each point by itself in every step, once the cameras
   /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
+  /// Under a loss: a Levenberg-Marquardt of each point, three tries for one of these.
   int inner_iterations = 3;
   Simd simd = Simd::best;  ///< for tests and measurements
 

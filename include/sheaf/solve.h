@@ -29,6 +29,10 @@ struct Iteration {
   double gradient_max = 0;  ///< px; largest |J_i^T r| / |J_i| over the free columns, at the state
                             ///< the step starts from, points eliminated
   double step_norm = 0;     ///< largest relative change of any one block
+  double scale_px = 0;      ///< of the loss in this step; 0: no loss
+  /// Least part of its weight that the step gave the loss's curvature along a residual
+  /// (docs/math.md, section 12); 1: the weight alone.
+  double loss_floor = 1;
   int linear_iterations = 0;
   double time_s = 0;  ///< since set-up ended
 };

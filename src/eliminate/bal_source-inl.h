@@ -13,6 +13,7 @@
 #include "eliminate/kernels.h"
 #include "eliminate/records-inl.h"
 #include "rows/bal_lanes-inl.h"
+#include "rows/metric_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -44,16 +45,13 @@ HWY_INLINE void add_to_point(const C& c, const SeenAs<W>& seen, W fd, W dd, W e0
   for (int i = 0; i < 3; ++i) s[i] = fma(c[i], h0, fma(c[3 + i], h1, fma(c[6 + i], h2, s[i])));
 }
 
-/// s += Jp^T w Jc dc of one observation per lane; weights: nullptr for w = 1.
-HWY_INLINE void add_coupled(const V* c, const Seen& seen, const double* weights, V* s) {
+/// s += Jp^T M Jc dc of one observation per lane; metric: nullptr for M = I.
+HWY_INLINE void add_coupled(const V* c, const Seen& seen, const double* metric, V* s) {
   const V fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
   const V dd = distortion_slope(c, seen.n);
   V e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
-  if (weights != nullptr) {
-    const V w = load(weights);
-    e0 = hn::Mul(e0, w), e1 = hn::Mul(e1, w);
-  }
+  if (metric != nullptr) load_metric(metric).apply(e0, e1);
   add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
@@ -120,10 +118,10 @@ struct BalSource {
     return records_from(records, at.batches->groups[g].first_batch - chunk.first_batch);
   }
 
-  HWY_INLINE void couple(std::uint64_t b, const double* weights, V* s) const {
+  HWY_INLINE void couple(std::uint64_t b, const double* metric, V* s) const {
     V c[kCameraRecord];
     load_fields<camera_record::kOctets>(in, of, b, c);
-    add_coupled(c, see(c, X[0], X[1], X[2]), weights, s);
+    add_coupled(c, see(c, X[0], X[1], X[2]), metric, s);
   }
   /// The residuals at points Y and, where they are asked for, the points' rows.
   template <bool kLinearize>

@@ -18,9 +18,10 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// What multiplies the rows of a lane twice: the weight of its loss, 0 in masked lanes.
+/// The weight of the loss, 0 in masked lanes: what makes the gradient of residuals that of costs.
 HWY_INLINE V row_weight(const ProductInput& in, std::uint64_t batch, int lane, V mask) {
-  return in.weights == nullptr ? mask : hn::Mul(mask, load(in.weights + 8 * batch + lane));
+  if (in.metric == nullptr) return mask;
+  return hn::Mul(mask, load_metric(in.metric + kMetricBatch * batch + lane).w);
 }
 
 void gradient(const ProductInput& in, const Chunk& chunk, double* sums) {
@@ -92,8 +93,10 @@ HWY_INLINE void curvature_part(const CurvatureInput& in, std::size_t g, int part
     const V dd = distortion_slope(c, seen.n);
     camera_motion(c, seen, fd, dd, e0, e1);
     add_point_motion(c, seen, fd, dd, step, e0, e1);
-    const V square = fma(e0, e0, hn::Mul(e1, e1));
-    sums.square[part] = fma(row_weight(state, b, lane, mask), square, sums.square[part]);
+    V m0 = e0, m1 = e1;
+    if (state.metric != nullptr) load_metric(state.metric + kMetricBatch * b + lane).apply(m0, m1);
+    const V square = fma(e0, m0, hn::Mul(e1, m1));
+    sums.square[part] = fma(mask, square, sums.square[part]);
   }
 }
 
@@ -122,7 +125,7 @@ double point_damping(const ProductInput& in, const Chunk& chunk) {
         load_cameras<camera_record::kOctets>(in.cameras, &batches.image[8 * b + lane],
                                              batches.uniform[b], c);
         add_coupled(c, see(c, X0, X1, X2),
-                    in.weights == nullptr ? nullptr : in.weights + 8 * b + lane, s);
+                    in.metric == nullptr ? nullptr : in.metric + kMetricBatch * b + lane, s);
       }
       const V mask = lane_mask(group.lanes, lane);
       for (V& x : s) x = hn::Mul(x, mask);

@@ -19,7 +19,7 @@ struct CurvatureOutput {
 };
 
 /// One instruction set's kernels for what a dogleg needs beyond a damped step. Rows carry the
-/// weights of a loss as elimination left them.
+/// the metric of a loss as elimination left it.
 struct DoglegKernels {
   const char* name;
   /// Adds -Jc^T r of the chunk's observations to the images' sums, kProductRecord doubles each of

@@ -64,6 +64,25 @@ struct PointSums {
     v22 = fma(a[2], a[2], fma(b[2], b[2], v22));
     for (int i = 0; i < 3; ++i) g[i] = fnma(a[i], j.r[0], fnma(b[i], j.r[1], g[i]));
   }
+  /// Each product of rows times w.
+  HWY_INLINE void add_weighted(const LaneJacobian& j, V w) {
+    const V *a = j.point[0], *b = j.point[1];
+    V x[3], y[3];
+    for (int i = 0; i < 3; ++i) x[i] = hn::Mul(w, a[i]), y[i] = hn::Mul(w, b[i]);
+    v00 = fma(x[0], a[0], fma(y[0], b[0], v00));
+    v01 = fma(x[0], a[1], fma(y[0], b[1], v01));
+    v02 = fma(x[0], a[2], fma(y[0], b[2], v02));
+    v11 = fma(x[1], a[1], fma(y[1], b[1], v11));
+    v12 = fma(x[1], a[2], fma(y[1], b[2], v12));
+    v22 = fma(x[2], a[2], fma(y[2], b[2], v22));
+    for (int i = 0; i < 3; ++i) g[i] = fnma(x[i], j.r[0], fnma(y[i], j.r[1], g[i]));
+  }
+  HWY_INLINE void take(hn::Mask<D> where, const PointSums& from) {
+    const auto choose = [where](V& to, V x) { to = hn::IfThenElse(where, x, to); };
+    choose(v00, from.v00), choose(v01, from.v01), choose(v02, from.v02);
+    choose(v11, from.v11), choose(v12, from.v12), choose(v22, from.v22);
+    for (int i = 0; i < 3; ++i) choose(g[i], from.g[i]);
+  }
 };
 
 /// Marquardt's damping of the points: D = lambda diag(V), clamped.
@@ -119,6 +138,7 @@ struct PassElimination {
   bool points_held;
   ScaledLoss loss{};
   ChartRules chart{};
+  const double* own_damping = nullptr;
 };
 
 /// Marquardt's damping of a part's points and the factor of V + D.
@@ -127,9 +147,8 @@ struct DampedFactor {
   V D[3];
 
   template <bool Charted>
-  HWY_INLINE void compute(const PassElimination& how, const PointSums& p,
+  HWY_INLINE void compute(const PassElimination& how, V lambda, const PointSums& p,
                           [[maybe_unused]] const LaneChart& chart) {
-    const V lambda = set(how.damping);
     D[0] = damp(lambda, p.v00), D[1] = damp(lambda, p.v11), D[2] = damp(lambda, p.v22);
     if constexpr (Charted) D[2] = damp_outward(how.chart, chart, p, D[2]);
     f = factor3(hn::Add(p.v00, D[0]), p.v01, p.v02, hn::Add(p.v11, D[1]), p.v12,

@@ -240,17 +240,18 @@ HWY_INLINE void scatter_floats(const FloatRows& rows, const FloatBatch& batch, i
   }
 }
 
-/// The loss's weights of one part's lanes, in two batches that are swept together.
+/// The loss's metric of one part's lanes, in two batches that are swept together.
 template <class DF>
-HWY_INLINE hn::Vec<DF> load_float_weights(DF d, const double* const* weights, int part) {
+HWY_INLINE MetricAs<hn::Vec<DF>> load_float_metric(DF d, const double* const* metric, int part) {
   constexpr int N = static_cast<int>(hn::MaxLanes(DF()));
   const hn::Rebind<float, D> df;
-  alignas(64) float w[kPairLanes];
+  alignas(64) float of[3][kPairLanes];
   for (int i = 0; i < N; i += kLanes) {
     const int lane = part * N + i;
-    hn::Store(hn::DemoteTo(df, load(weights[lane / 8] + lane % 8)), df, w + i);
+    for (int k = 0; k < 3; ++k)
+      hn::Store(hn::DemoteTo(df, load(metric[lane / 8] + 8 * k + lane % 8)), df, of[k] + i);
   }
-  return hn::Load(d, w);
+  return {hn::Load(d, of[0]), hn::Load(d, of[1]), hn::Load(d, of[2])};
 }
 
 /// One group, or two of one track length.
@@ -269,10 +270,10 @@ HWY_INLINE void product_float_groups(const FloatProductInput& in, std::size_t g,
     return FloatBatch{{&batches.image[8 * b], &batches.image[8 * other]},
                       {batches.uniform[b], batches.uniform[other]}};
   };
-  const auto weights_at = [&](std::uint32_t o, int part) {
+  const auto metric_at = [&](std::uint32_t o, int part) {
     const std::uint64_t b = batches.groups[g].first_batch + o, other = b + (count - 1) * track;
-    const double* both[2] = {in.weights + 8 * b, in.weights + 8 * other};
-    return load_float_weights(d, both, part);
+    const double* both[2] = {in.metric + kMetricBatch * b, in.metric + kMetricBatch * other};
+    return load_float_metric(d, both, part);
   };
   FloatGroups groups;
   for (int i = 0; i < count; ++i) groups.take(in, g + i, i);
@@ -287,9 +288,9 @@ HWY_INLINE void product_float_groups(const FloatProductInput& in, std::size_t g,
       float* to = saved + kPart * (parts * o + part);
       load_float_cameras(d, in.cameras, batch_at(o), part, to);
       const FloatFields<DF> c{to};
-      W weight = mask;
-      if constexpr (Robust) weight = hn::Mul(mask, weights_at(o, part));
-      first_sweep(c, X0, X1, X2, Robust || !groups.full ? &weight : nullptr, to + 24 * N, s);
+      MetricAs<W> metric;
+      if constexpr (Robust) metric = metric_at(o, part);
+      first_sweep<Robust>(c, X0, X1, X2, groups.full ? nullptr : &mask, metric, to + 24 * N, s);
     }
     const auto factor = [&](int k) { return hn::Load(d, groups.factor[k] + lane); };
     const FactorAs<W> f{factor(0), factor(1), factor(2), factor(3), factor(4), factor(5)};
@@ -302,9 +303,9 @@ HWY_INLINE void product_float_groups(const FloatProductInput& in, std::size_t g,
     for (int part = 0; part < parts; ++part) {
       W v[9];
       const float* from = saved + kPart * (parts * o + part);
-      W weight = hn::Zero(d);  // not read without a loss
-      if constexpr (Robust) weight = weights_at(o, part);
-      second_sweep<Robust>(from, from + 24 * N, weight, u[part], v);
+      MetricAs<W> metric;
+      if constexpr (Robust) metric = metric_at(o, part);
+      second_sweep<Robust>(from, from + 24 * N, metric, u[part], v);
       rows.put(d, v, part);
     }
     for (int i = 0; i < count; ++i) scatter_floats(rows, batch_at(o), i, sums);

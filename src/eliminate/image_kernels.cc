@@ -36,7 +36,11 @@ HWY_INLINE void linearize_batch(const double* z, const V* c, const V* mask, cons
   LaneJacobian j =
       linearize_lanes(c, load(z), load(z + 8), load(z + 16), load(z + 24), load(z + 32), mask);
   square = fma(j.r[0], j.r[0], fma(j.r[1], j.r[1], square));
-  if constexpr (Robust) cost = hn::Add(cost, apply_loss(loss, j).value);
+  if constexpr (Robust) {
+    const LossRows rows(LossLanes(loss), j.r, fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
+    apply_loss(rows, j);
+    cost = hn::Add(cost, rows.rho.value);
+  }
   for (int r = 0; r < 2; ++r) {
     double* row = to + kRowVectors * kLanes * r;
     store(j.r[r], row);

@@ -11,7 +11,7 @@ namespace sheaf {
 
 /// Sums over a piece of an image's observations, J = Jc (2 x 9; rho, phi, f, k1, k2): the lower
 /// triangle of sum J^T J row by row (45), sum J^T r (9), sum |r|^2, sum rho(|r|^2). With a loss,
-/// rows are weighted by sqrt(rho').
+/// rows are those of its metric (geometry/row_metric.h).
 namespace image_sums {
 constexpr int kGradient = 45, kSquare = 54, kLoss = 55;
 constexpr std::size_t kCount = 56;

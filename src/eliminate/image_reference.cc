@@ -26,16 +26,14 @@ void sum(const double* batches, const ImageBatches::Piece& piece, const double* 
   for (std::uint32_t b = 0; b < piece.batches; ++b) {
     const std::uint32_t lanes = b + 1 == piece.batches ? piece.last_lanes : 8;
     for (std::uint32_t l = 0; l < lanes; ++l) {
-      const Row o = observe(batches, b, l, camera);
-      const double square = o.square();
-      const LossValue<double> rho = evaluate_loss(loss, square);
-      sums[image_sums::kSquare] += square;
-      if (loss.kind != LossKind::none) sums[image_sums::kLoss] += rho.value;
+      Row o = observe(batches, b, l, camera);
+      sums[image_sums::kSquare] += o.square();
+      if (loss.kind != LossKind::none) sums[image_sums::kLoss] += apply_loss(loss, o).value;
       for (int row = 0; row < 2; ++row) {
         const double* J = &o.j.camera[9 * row];
         for (int i = 0; i < (lens ? 9 : 6); ++i) {
-          sums[image_sums::kGradient + i] += rho.first * J[i] * o.r[row];
-          for (int k = 0; k <= i; ++k) sums[image_sums::entry(i, k)] += rho.first * J[i] * J[k];
+          sums[image_sums::kGradient + i] += J[i] * o.r[row];
+          for (int k = 0; k <= i; ++k) sums[image_sums::entry(i, k)] += J[i] * J[k];
         }
       }
     }

@@ -24,9 +24,9 @@ namespace HWY_NAMESPACE {
 
 void linearize(const EliminateInput& in, const Chunk& chunk, const Records& records,
                EliminateOutput& out) {
-  eliminate_points<BalSource>(
-      {{in.batches, in.cameras, in.points}, {in.damping, in.points_held, in.loss, in.chart}}, chunk,
-      records, out);
+  eliminate_points<BalSource>({{in.batches, in.cameras, in.points},
+                               {in.damping, in.points_held, in.loss, in.chart, in.own_damping}},
+                              chunk, records, out);
 }
 
 void diagonal(const Batches& batches, const Chunks& chunks, const Chunk& chunk,
@@ -44,17 +44,17 @@ void coarse(const Batches& batches, const Chunk& chunk, const Records& records,
 }
 
 void trial(const TrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  try_points<BalSource>(
-      {{in.batches, in.cameras, in.points},
-       {in.batches, in.trial_cameras, nullptr},
-       in.factors,
-       in.weights,
-       {in.count_newly_behind, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend}},
-      chunk, out);
+  try_points<BalSource>({{in.batches, in.cameras, in.points},
+                         {in.batches, in.trial_cameras, nullptr},
+                         in.factors,
+                         in.metric,
+                         {in.count_newly_behind, in.inner_iterations, in.mean_square, in.loss,
+                          in.chart, in.blend, in.own}},
+                        chunk, out);
 }
 
 void product(const ProductInput& in, const Chunk& chunk, double* saved, double* y) {
-  if (in.weights == nullptr)
+  if (in.metric == nullptr)
     product_chunk<false>(in, chunk, saved, y);
   else
     product_chunk<true>(in, chunk, saved, y);
@@ -66,7 +66,7 @@ void residuals(const Batches& batches, const double* cameras, const double* poin
 }
 
 void product_float(const FloatProductInput& in, const Chunk& chunk, float* saved, double* y) {
-  if (in.weights == nullptr)
+  if (in.metric == nullptr)
     product_float_chunk<false>(in, chunk, saved, y);
   else
     product_float_chunk<true>(in, chunk, saved, y);

@@ -23,17 +23,20 @@ struct EliminateInput {
   bool points_held;
   ScaledLoss loss{};
   ChartRules chart{};
+  /// Of each point, 8 per group: at least this much instead of `damping`; nullptr: none has its
+  /// own.
+  const double* own_damping = nullptr;
 };
 /// diag(J^T J) is clamped to this range before it is scaled by lambda.
 constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
 
 struct EliminateOutput {
-  double* factors;            ///< kFactorGroup per group
-  double square_sum;          ///< sum |r|^2
-  double point_decrease;      ///< sum |w|^2
-  double gradient_max2;       ///< largest |w|^2 of a point
-  double loss_sum = 0;        ///< sum rho(|r|^2); not summed without a loss
-  double* weights = nullptr;  ///< rho'(|r|^2), 8 per batch; not written without a loss
+  double* factors;           ///< kFactorGroup per group
+  double square_sum;         ///< sum |r|^2
+  double point_decrease;     ///< sum |w|^2
+  double gradient_max2;      ///< largest |w|^2 of a point
+  double loss_sum = 0;       ///< sum rho(|r|^2); not summed without a loss
+  double* metric = nullptr;  ///< kMetricBatch per batch; not written without a loss
 };
 
 /// Once the cameras have stepped and the points followed by back-substitution, each point takes
@@ -43,6 +46,11 @@ struct EliminateOutput {
 /// A step that does not lower the point's own cost is not taken. Decreases are of sum |r|^2 (or rho
 /// of it), as the point's own linear model predicts them, in mean_square by observation of the
 /// point.
+/// With a loss these are a Levenberg-Marquardt of its own: from the cheaper of where the step leads
+/// and where the point was, steps by the loss's metric, by the weight alone where such a step
+/// fails, and with ten times the damping where that fails too; each may take kTries tries for one
+/// of `inner_iterations`. A point that the step made worse than where it was damps itself by more
+/// in the elimination to come, and by less again after each step that served it.
 namespace inner_iterations {
 constexpr double kWorthOne = 1e-4;  ///< smaller decreases are left to the next iteration
 constexpr double kWorthMore = 0.1;  ///< after a larger one, another step is looked at
@@ -53,7 +61,25 @@ constexpr double kDamping = 0.3;
 /// its base, follows its base: its distance is damped by what is seen of it, which may be little,
 /// and a long step can end anywhere, in a camera's plane too.
 constexpr double kLost = 1e4;
+constexpr int kTries = 3;
+/// Own damping: the least of a point that fell back, and of one whose steps fail.
+constexpr double kLeastOwn = 1e-4;
+/// Decreases that are worth a pass, in the last step's relative decrease of the whole cost: points
+/// settle as the cameras do. Never more than kWorthOne.
+constexpr double kWorthOfLast = 0.01, kLeastWorth = 1e-14;
+/// Of a point that has fallen back to where it was, or followed its step; lambda: the common one.
+inline double next_own_damping(bool fell, double lambda, double own) {
+  const double most = own > lambda ? own : lambda;
+  if (fell) return 10 * most > kLeastOwn ? 10 * most : kLeastOwn;
+  return 0.1 * own < lambda ? 0 : 0.1 * own;
+}
 }  // namespace inner_iterations
+
+/// What a point's own iterations go by under a loss.
+struct OwnIterations {
+  double damping = 0;                          ///< lambda of the step
+  double worth = inner_iterations::kWorthOne;  ///< smaller decreases are left
+};
 
 /// The step of a point: `newton` times what back-substitution gives and `descent` times D^-1 g; of
 /// points by X, Y, Z only.
@@ -73,18 +99,21 @@ struct TrialInput {
   int inner_iterations;  ///< at most, of each point
   double mean_square;    ///< sum |r|^2, or rho of it, at the held state by observation
   ScaledLoss loss{};
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
-  ChartRules chart{};               ///< as in elimination; ChartBase::none where points are held
+  const double* metric = nullptr;  ///< as elimination left it; nullptr: no loss
+  ChartRules chart{};              ///< as in elimination; ChartBase::none where points are held
   PointBlend blend{};
+  OwnIterations own{};
 };
 
 struct TrialOutput {
-  double* points;              ///< stepped
-  double square_sum;           ///< sum |r|^2 at the stepped state
-  double damping_term;         ///< sum d^T D d over points, d as back-substituted
-  double step2_max;            ///< largest |d|^2 / |X|^2 of a point, or chart_step2
-  std::uint64_t newly_behind;  ///< observations behind their camera that were not (if asked for)
-  double loss_sum = 0;         ///< sum rho(|r|^2) there; not summed without a loss
+  double* points;                 ///< stepped
+  double square_sum;              ///< sum |r|^2 at the stepped state
+  double damping_term;            ///< sum d^T D d over points, d as back-substituted
+  double step2_max;               ///< largest |d|^2 / |X|^2 of a point, or chart_step2
+  std::uint64_t newly_behind;     ///< observations behind their camera that were not (if asked for)
+  double loss_sum = 0;            ///< sum rho(|r|^2) there; not summed without a loss
+  double left_decrease = 0;       ///< sum |w|^2 of the points that did not follow the step
+  double* own_damping = nullptr;  ///< as EliminateInput; read and, with a loss, written
 };
 
 /// x is the step in the camera records.
@@ -93,7 +122,7 @@ struct ProductInput {
   const double* cameras;  ///< held state, with x as the step
   const double* points;
   const double* factors;
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  const double* metric = nullptr;  ///< as elimination left it; nullptr: no loss
 };
 /// The same in single precision. Lengths are what the scene's are after (X - origin) scale, so that
 /// neither the place of the scene nor its unit can take digits or leave the range of floats.
@@ -103,7 +132,7 @@ struct FloatProductInput {
   const double* points;   ///< as they are
   const double* factors;  ///< as they are
   double origin[3], scale;
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  const double* metric = nullptr;  ///< as elimination left it; nullptr: no loss
 };
 struct CoarseInput {
   const double* basis;          ///< kCoarseBasis per image

@@ -38,7 +38,6 @@ constexpr std::size_t kOneRow = row_field::count(2) * kLanes;
 inline void lens_gradient_group(const LensProductInput& in, std::size_t g, double* sums) {
   const Batches& batches = *in.of.batches;
   const Batches::Group& group = batches.groups[g];
-  const V none[3] = {zero(), zero(), zero()};
   alignas(64) double saved[kOneRow];
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     V v[kParts][27];
@@ -46,11 +45,12 @@ inline void lens_gradient_group(const LensProductInput& in, std::size_t g, doubl
       const int lane = part * kLanes;
       const double* at = in.of.at.points + kPointGroup * g + lane;
       const V X[3] = {load(at), load(at + 8), load(at + 16)};
-      const V scale = row_scale(in, b, lane, lane_mask(group.lanes, lane));
-      LaneJacobian j = lens_rows(in.of, b, lane, X, saved + row_field::kCount * kLanes);
-      for (V& r : j.r) r = hn::Neg(hn::Mul(hn::Mul(scale, scale), r));
+      const LaneJacobian j = lens_rows(in.of, b, lane, X, saved + row_field::kCount * kLanes);
       save(j, saved);
-      second_lens_sweep(saved, in.of.tracks->most_blocks, zero(), none, v[part]);
+      V w = lane_mask(group.lanes, lane);
+      if (in.metric != nullptr) w = hn::Mul(w, load_metric(in.metric + kMetricBatch * b + lane).w);
+      const V down[2] = {hn::Neg(hn::Mul(w, j.r[0])), hn::Neg(hn::Mul(w, j.r[1]))};
+      lens_rows_times(saved, in.of.tracks->most_blocks, down, v[part]);
     }
     scatter_to_blocks(in.of, b, v, sums);
   }
@@ -73,16 +73,17 @@ HWY_INLINE void lens_curvature_part(const LensProductInput& in, double damping, 
     gradient2 = fma(mask, sum, gradient2);
   }
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
-    const V scale = row_scale(in, b, lane, mask);
-    V unused[3] = {zero(), zero(), zero()};
-    // With a scale of 1, e = Jc x comes to stand where residuals do.
-    first_lens_sweep(in, b, lane, X, set(1.0), saved, unused);
+    V unused[3] = {zero(), zero(), zero()}, e[2];
+    // With nothing between, e = Jc x comes to stand where residuals do.
+    first_lens_sweep(in, b, lane, X, Between(set(1.0)), saved, unused);
     for (int r = 0; r < 2; ++r) {
-      V e = load_field(saved, row_field::residual(r));
-      for (int i = 0; i < 3; ++i) e = fma(load_field(saved, row_field::point(r, i)), step[i], e);
-      e = hn::Mul(e, scale);
-      square = fma(e, e, square);
+      e[r] = load_field(saved, row_field::residual(r));
+      for (int i = 0; i < 3; ++i)
+        e[r] = fma(load_field(saved, row_field::point(r, i)), step[i], e[r]);
     }
+    V m[2] = {e[0], e[1]};
+    Between(in, b, lane, mask).apply(m);
+    for (int r = 0; r < 2; ++r) square = fma(e[r], m[r], square);
   }
 }
 
@@ -97,6 +98,21 @@ inline void lens_curvature_chunk(const LensProductInput& in, double damping, boo
   out.gradient2 += sum_parts(gradient2);
 }
 
+/// The root of what stands between the two factors of each product of rows.
+struct RootBetween {
+  Between of;
+  MetricRoot root;
+
+  HWY_INLINE RootBetween(const LensProductInput& in, std::uint64_t batch, int lane, V used)
+      : of(in, batch, lane, used) {
+    if (of.robust) root = MetricRoot(of.metric);
+  }
+  HWY_INLINE void apply(V& j0, V& j1) const {
+    if (of.robust) root.column(of.metric, j0, j1);
+    j0 = hn::Mul(of.mask, j0), j1 = hn::Mul(of.mask, j1);
+  }
+};
+
 /// Rows to floats, a field of eight lanes after the other.
 inline void keep_group(const LensProductInput& in, double unit, std::size_t g, float* rows) {
   const hn::Rebind<float, D> narrow;
@@ -108,21 +124,23 @@ inline void keep_group(const LensProductInput& in, double unit, std::size_t g, f
     for (int lane = 0; lane < 8; lane += kLanes) {
       const double* at = in.of.at.points + kPointGroup * g + lane;
       const V X[3] = {load(at), load(at + 8), load(at + 16)};
-      const V root = row_scale(in, b, lane, lane_mask(group.lanes, lane));
-      const V shorter = hn::Mul(root, set(1 / unit));
       const LaneJacobian j = lens_rows(in.of, b, lane, X, saved + row_field::kCount * kLanes);
       float* to = rows + 8 * kept_row::fields(blocks) * b + lane;
-      const auto keep = [&](V x, int field) {
-        hn::StoreU(hn::DemoteTo(narrow, x), narrow, to + 8 * field);
+      const RootBetween between(in, b, lane, lane_mask(group.lanes, lane));
+      const auto keep = [&](V j0, V j1, double by, int first, int second) {
+        between.apply(j0, j1);
+        hn::StoreU(hn::DemoteTo(narrow, hn::Mul(j0, set(by))), narrow, to + 8 * first);
+        hn::StoreU(hn::DemoteTo(narrow, hn::Mul(j1, set(by))), narrow, to + 8 * second);
       };
-      for (int r = 0; r < 2; ++r) {
-        for (int i = 0; i < 3; ++i) keep(hn::Mul(shorter, j.point[r][i]), kept_row::point(r, i));
-        for (int i = 0; i < 9; ++i) keep(hn::Mul(root, j.camera[r][i]), kept_row::camera(r, i));
-        for (int k = 0; k < blocks; ++k)
-          for (int i = 0; i < 9; ++i)
-            keep(hn::Mul(root, load(lens + kLanes * row_field::lens(k, r, i))),
-                 kept_row::lens(k, r, i));
-      }
+      for (int i = 0; i < 3; ++i)
+        keep(j.point[0][i], j.point[1][i], 1 / unit, kept_row::point(0, i), kept_row::point(1, i));
+      for (int i = 0; i < 9; ++i)
+        keep(j.camera[0][i], j.camera[1][i], 1, kept_row::camera(0, i), kept_row::camera(1, i));
+      for (int k = 0; k < blocks; ++k)
+        for (int i = 0; i < 9; ++i)
+          keep(load(lens + kLanes * row_field::lens(k, 0, i)),
+               load(lens + kLanes * row_field::lens(k, 1, i)), 1, kept_row::lens(k, 0, i),
+               kept_row::lens(k, 1, i));
     }
 }
 
@@ -139,7 +157,7 @@ inline double lens_point_damping_chunk(const LensProductInput& in, const Chunk& 
       const V mask = lane_mask(group.lanes, lane);
       V s[3] = {zero(), zero(), zero()}, d[3];
       for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-        first_lens_sweep(in, b, lane, X, row_scale(in, b, lane, mask), saved, s);
+        first_lens_sweep(in, b, lane, X, Between(in, b, lane, mask), saved, s);
       const V square = back_substitute(in.factors + kFactorGroup * g + lane, s, d);
       sums[part] = fma(mask, square, sums[part]);
     }

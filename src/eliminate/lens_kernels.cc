@@ -25,8 +25,9 @@ namespace HWY_NAMESPACE {
 
 void linearize_lenses(const LensEliminateInput& in, const Chunk& chunk, const LensRecords& records,
                       EliminateOutput& out) {
-  eliminate_points<LensSource>({in.of, {in.damping, in.points_held, in.loss, in.chart}}, chunk,
-                               records, out);
+  eliminate_points<LensSource>(
+      {in.of, {in.damping, in.points_held, in.loss, in.chart, in.own_damping}}, chunk, records,
+      out);
 }
 
 void multiply_lenses(const LensTracks& tracks, const LensTiles& tiles_of, const Chunks& chunks,
@@ -45,8 +46,8 @@ void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) 
       {{in.batches, in.tracks, in.held},
        {in.batches, in.tracks, in.tried},
        in.factors,
-       in.weights,
-       {false, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend}},
+       in.metric,
+       {false, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend, in.own}},
       chunk, out);
 }
 

@@ -29,6 +29,7 @@ struct LensEliminateInput {
   bool points_held;
   ScaledLoss loss{};
   ChartRules chart{};
+  const double* own_damping = nullptr;  ///< as EliminateInput
 };
 
 /// Records of one chunk. Those of observations are as elimination of any rows leaves them; the T
@@ -75,16 +76,17 @@ struct LensTrialInput {
   int inner_iterations;
   double mean_square;
   ScaledLoss loss{};
-  const double* weights = nullptr;
+  const double* metric = nullptr;
   ChartRules chart{};  ///< as in elimination; ChartBase::none where points are held
   PointBlend blend{};
+  OwnIterations own{};
 };
 
 /// x: kProductRecord doubles for each block of an image or a lens, nine of them used.
 struct LensProductInput {
   LensInput of;
   const double* factors;
-  const double* weights = nullptr;  ///< as elimination left them; nullptr: no loss
+  const double* metric = nullptr;  ///< as elimination left it; nullptr: no loss
   const double* x = nullptr;
 };
 /// Doubles of `saved` that a product needs.

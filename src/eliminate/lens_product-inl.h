@@ -62,16 +62,28 @@ HWY_INLINE void load_image(const double* x, const std::uint32_t* image, std::int
   out[8] = load(last);
 }
 
-/// The rows' scale: the root of the loss's weight, 0 in masked lanes.
-HWY_INLINE V row_scale(const LensProductInput& in, std::uint64_t batch, int lane, V mask) {
-  if (in.weights == nullptr) return mask;
-  return hn::Mul(mask, hn::Sqrt(load(in.weights + 8 * batch + lane)));
-}
+/// What stands between the two factors of each product of rows: the loss's metric, 0 in masked
+/// lanes.
+struct Between {
+  V mask;
+  bool robust;
+  Metric metric;
+
+  HWY_INLINE explicit Between(V used) : mask(used), robust(false) {}
+  HWY_INLINE Between(const LensProductInput& in, std::uint64_t batch, int lane, V used)
+      : mask(used), robust(in.metric != nullptr) {
+    if (robust) metric = load_metric(in.metric + kMetricBatch * batch + lane);
+  }
+  HWY_INLINE void apply(V* e) const {
+    if (robust) metric.apply(e[0], e[1]);
+    e[0] = hn::Mul(mask, e[0]), e[1] = hn::Mul(mask, e[1]);
+  }
+};
 
 /// e = Jc x of a part's observation, whose rows go to `row`, with e where residuals stand; and
 /// s += Jp^T e.
 HWY_INLINE void first_lens_sweep(const LensProductInput& in, std::uint64_t batch, int lane,
-                                 const V* X, V scale, double* row, V* s) {
+                                 const V* X, const Between& between, double* row, V* s) {
   const LensTracks& tracks = *in.of.tracks;
   double* lens = row + row_field::kCount * kLanes;
   LaneJacobian j = lens_rows(in.of, batch, lane, X, lens);
@@ -87,22 +99,14 @@ HWY_INLINE void first_lens_sweep(const LensProductInput& in, std::uint64_t batch
       for (int i = 0; i < 9; ++i)
         e[r] = fma(load(lens + kLanes * row_field::lens(b, r, i)), x[i], e[r]);
   }
-  // Of the two factors of each product of rows, one takes the whole weight.
-  scale = hn::Mul(scale, scale);
-  for (int r = 0; r < 2; ++r) j.r[r] = hn::Mul(e[r], scale);
+  between.apply(e);
+  for (int r = 0; r < 2; ++r) j.r[r] = e[r];
   for (int i = 0; i < 3; ++i) s[i] = fma(j.point[0][i], j.r[0], fma(j.point[1][i], j.r[1], s[i]));
   save(j, row);
 }
 
-/// v = Jc^T (e - w Jp u) of a part's observation: the image's nine, then nine for each block.
-HWY_INLINE void second_lens_sweep(const double* row, int blocks, V scale, const V* u, V* v) {
-  V e[2];
-  scale = hn::Mul(scale, scale);
-  for (int r = 0; r < 2; ++r) {
-    V along = zero();
-    for (int i = 0; i < 3; ++i) along = fma(load_field(row, row_field::point(r, i)), u[i], along);
-    e[r] = fnma(scale, along, load_field(row, row_field::residual(r)));
-  }
+/// v = Jc^T e of a part's observation: the image's nine, then nine for each block.
+HWY_INLINE void lens_rows_times(const double* row, int blocks, const V* e, V* v) {
   for (int i = 0; i < 9; ++i)
     v[i] = fma(load_field(row, row_field::camera(0, i)), e[0],
                hn::Mul(load_field(row, row_field::camera(1, i)), e[1]));
@@ -111,6 +115,18 @@ HWY_INLINE void second_lens_sweep(const double* row, int blocks, V scale, const 
     for (int i = 0; i < 9; ++i)
       v[9 + 9 * b + i] = fma(load(lens + kLanes * row_field::lens(b, 0, i)), e[0],
                              hn::Mul(load(lens + kLanes * row_field::lens(b, 1, i)), e[1]));
+}
+
+/// v = Jc^T (e - M Jp u).
+HWY_INLINE void second_lens_sweep(const double* row, int blocks, const Between& between, const V* u,
+                                  V* v) {
+  V along[2] = {zero(), zero()}, e[2];
+  for (int r = 0; r < 2; ++r)
+    for (int i = 0; i < 3; ++i)
+      along[r] = fma(load_field(row, row_field::point(r, i)), u[i], along[r]);
+  between.apply(along);
+  for (int r = 0; r < 2; ++r) e[r] = hn::Sub(load_field(row, row_field::residual(r)), along[r]);
+  lens_rows_times(row, blocks, e, v);
 }
 
 HWY_INLINE void scatter_to_lenses(const double* rows, const double* ninth, const LensBlocks& blocks,
@@ -159,7 +175,7 @@ constexpr int kPlainFields = 20;
 
 /// As first_lens_sweep.
 HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batch, int lane,
-                                  const V* X, V scale, double* saved, V* s) {
+                                  const V* X, const Between& between, double* saved, V* s) {
   const LensTracks& tracks = *in.of.tracks;
   const Batches& batches = *in.of.batches;
   LensView view;
@@ -187,9 +203,7 @@ HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batc
       store(view.J.parameters[r][p].v, to);
     }
   }
-  // Of the two factors of each product of rows, one takes the whole weight.
-  scale = hn::Mul(scale, scale);
-  for (int r = 0; r < 2; ++r) e[r] = hn::Mul(e[r], scale);
+  between.apply(e);
   V g[3];
   for (int i = 0; i < 3; ++i) g[i] = fma(A[0][i], e[0], hn::Mul(A[1][i], e[1]));
   for (int i = 0; i < 3; ++i)
@@ -204,19 +218,18 @@ HWY_INLINE void first_plain_sweep(const LensProductInput& in, std::uint64_t batc
 
 /// As second_lens_sweep; what the lens's own blocks get is added to `sums`, eight lanes for each
 /// free parameter in turn.
-HWY_INLINE void second_plain_sweep(const double* saved, const LensPlaces& lens, int lane, V scale,
-                                   const V* u, V* v, double* sums) {
+HWY_INLINE void second_plain_sweep(const double* saved, const LensPlaces& lens, int lane,
+                                   const Between& between, const V* u, V* v, double* sums) {
   const auto field = [&](int i) { return load_field(saved, i); };
-  scale = hn::Mul(scale, scale);
   V m[3], e[2];
   for (int i = 0; i < 3; ++i)
     m[i] =
         fma(field(9 + 3 * i), u[0], fma(field(10 + 3 * i), u[1], hn::Mul(field(11 + 3 * i), u[2])));
   for (int r = 0; r < 2; ++r) {
-    const V along =
-        fma(field(3 * r), m[0], fma(field(3 * r + 1), m[1], hn::Mul(field(3 * r + 2), m[2])));
-    e[r] = fnma(scale, along, field(18 + r));
+    e[r] = fma(field(3 * r), m[0], fma(field(3 * r + 1), m[1], hn::Mul(field(3 * r + 2), m[2])));
   }
+  between.apply(e);
+  for (int r = 0; r < 2; ++r) e[r] = hn::Sub(field(18 + r), e[r]);
   for (int i = 0; i < 3; ++i) v[i] = fma(field(i), e[0], hn::Mul(field(3 + i), e[1]));
   const V P0 = field(6), P1 = field(7), P2 = field(8);
   v[3] = fms(P1, v[2], hn::Mul(P2, v[1]));
@@ -291,12 +304,12 @@ inline void lens_product_group(const LensProductInput& in, std::size_t g, double
     V s[3] = {zero(), zero(), zero()};
     for (std::uint32_t o = 0; o < group.track; ++o) {
       const std::uint64_t b = group.first_batch + o;
-      const V scale = row_scale(in, b, lane, mask);
+      const Between between(in, b, lane, mask);
       double* to = saved + part_doubles * (kParts * o + part);
       if (is_plain(tracks, b))
-        first_plain_sweep(in, b, lane, X, scale, to, s);
+        first_plain_sweep(in, b, lane, X, between, to, s);
       else
-        first_lens_sweep(in, b, lane, X, scale, to, s);
+        first_lens_sweep(in, b, lane, X, between, to, s);
     }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
   }
@@ -312,11 +325,11 @@ inline void lens_product_group(const LensProductInput& in, std::size_t g, double
       const int lane = part * kLanes;
       V v[27];
       const double* from = saved + part_doubles * (kParts * o + part);
-      const V scale = row_scale(in, b, lane, lane_mask(group.lanes, lane));
+      const Between between(in, b, lane, lane_mask(group.lanes, lane));
       if (plain)
-        second_plain_sweep(from, lens, lane, scale, u[part], v, lens_sums);
+        second_plain_sweep(from, lens, lane, between, u[part], v, lens_sums);
       else
-        second_lens_sweep(from, blocks, scale, u[part], v);
+        second_lens_sweep(from, blocks, between, u[part], v);
       for (int k = 0; k <= own_blocks; ++k) {
         store_records(v + 9 * k, rows[k] + 8 * lane, 8);
         store(v[9 * k + 8], ninth[k] + lane);

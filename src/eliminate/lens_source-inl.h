@@ -11,6 +11,7 @@
 
 #include "eliminate/lens_records-inl.h"
 #include "eliminate/lens_rows-inl.h"
+#include "rows/metric_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -79,6 +80,16 @@ struct LensSource {
     for (std::size_t i = row_field::kCount; i < row_fields(*in.tracks); ++i)
       store(hn::Mul(load(room + kLanes * i), by), room + kLanes * i);
   }
+  HWY_INLINE void apply_loss_to_others(const LossRows& rows, double* room) const {
+    for (int k = 0; k < in.tracks->most_blocks; ++k)
+      for (int i = 0; i < 9; ++i) {
+        double* first = room + kLanes * (row_field::kCount + row_field::lens(k, 0, i));
+        double* second = room + kLanes * (row_field::kCount + row_field::lens(k, 1, i));
+        V j0 = load(first), j1 = load(second);
+        rows.column(j0, j1);
+        store(j0, first), store(j1, second);
+      }
+  }
   HWY_INLINE const double* keep(const LaneJacobian& j, std::uint32_t o, double* room) const {
     save(j, room + stride() * o);
     return room;
@@ -88,7 +99,7 @@ struct LensSource {
     write_part_records(*in.tracks, of, f, w, rows, to);
   }
 
-  HWY_INLINE void couple(std::uint64_t b, const double* weights, V* s) const {
+  HWY_INLINE void couple(std::uint64_t b, const double* metric, V* s) const {
     LensView view;
     const LensTracks& tracks = *in.tracks;
     look<Wanted::parameters, true>(*in.batches, tracks, in.at, b, of.lane(), X, view);
@@ -99,8 +110,7 @@ struct LensSource {
     V e[2], point[2][3];
     lens_motion(view, kind < 0 ? tracks.most_parameters : count(tracks.kinds[std::size_t(kind)]),
                 e);
-    if (weights != nullptr)
-      for (V& x : e) x = hn::Mul(x, load(weights));
+    if (metric != nullptr) load_metric(metric).apply(e[0], e[1]);
     point_rows(view, point);
     for (int i = 0; i < 3; ++i) s[i] = fma(point[0][i], e[0], fma(point[1][i], e[1], s[i]));
   }

@@ -7,7 +7,7 @@
 //   rows(batch, mask, room)        residuals and Jacobians at the held state, of a part's lanes
 //   keep(rows, o, room), stride()  where they wait until the points are factored
 //   write(factor, w, rows, to)     their records
-//   couple(batch, weights, s)      s += Jp^T w Jc dc
+//   couple(batch, metric, s)       s += Jp^T M Jc dc
 // and, where it can tell the residuals of any state (kEvaluates), evaluate(state, part, batch, Y).
 #if defined(SHEAF_ELIMINATE_POINT_PASS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SHEAF_ELIMINATE_POINT_PASS_INL_H_
@@ -21,7 +21,7 @@
 #include "eliminate/factor-inl.h"
 #include "eliminate/group_part-inl.h"
 #include "eliminate/records-inl.h"
-#include "rows/loss_lanes-inl.h"
+#include "rows/metric_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -38,11 +38,33 @@ struct EliminateSums {
   V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
 
-/// The rows of a loss: sqrt(rho') times those of the residual.
-HWY_INLINE Rho apply_loss(const ScaledLoss& loss, LaneJacobian& j) {
-  const Rho rho = rho_lanes(LossLanes(loss), fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1])));
-  scale_rows(hn::Sqrt(rho.weight), j);
-  return rho;
+/// What a loss's metric takes from V by its weight alone: sum (Jp^T u) (Jp^T u)^T, upper triangle.
+struct MetricLess {
+  V v[6];
+
+  HWY_INLINE void clear() {
+    for (V& x : v) x = zero();
+  }
+  /// chart: of the points' coordinates; nullptr: of rows that are by them already.
+  HWY_INLINE void add(const LaneJacobian& j, const Metric& m, const LaneChart* chart) {
+    V a[3];
+    for (int i = 0; i < 3; ++i) a[i] = fma(m.u0, j.point[0][i], hn::Mul(m.u1, j.point[1][i]));
+    if (chart != nullptr) chart->transpose(a);
+    for (int i = 0, at = 0; i < 3; ++i)
+      for (int k = i; k < 3; ++k, ++at) v[at] = fma(a[i], a[k], v[at]);
+  }
+  /// p.V += sign v.
+  HWY_INLINE void add_to(PointSums& p, V sign) const {
+    V* const to[6] = {&p.v00, &p.v01, &p.v02, &p.v11, &p.v12, &p.v22};
+    for (int i = 0; i < 6; ++i) *to[i] = fma(sign, v[i], *to[i]);
+  }
+};
+
+/// The rows of a loss by the point and the image's columns.
+HWY_INLINE void apply_loss(const LossRows& rows, LaneJacobian& j) {
+  for (int i = 0; i < 3; ++i) rows.column(j.point[0][i], j.point[1][i]);
+  for (int i = 0; i < 9; ++i) rows.column(j.camera[0][i], j.camera[1][i]);
+  rows.residual(j.r);
 }
 
 /// The base of a part's points at a state.
@@ -52,18 +74,37 @@ HWY_INLINE void base_of(const ChartRules& rules, const typename Source::State& a
   load_base(rules, *at.batches, of.first_batch, of.lane(), Source::images(at), base);
 }
 
-/// Factors the points of a part, whose normal equations are p by their chart's coordinates.
+/// The scaled gradient of points under a loss, squared: |L^-1 g|^2 by the weight alone, whose V is
+/// no less than g g^T / s. By the metric the same gradient would count up to 1 / delta as much.
 template <bool kCharted>
+HWY_INLINE V gradient_by_weight(const PassElimination& how, PointSums p, const MetricLess& less,
+                                const LaneChart& chart) {
+  less.add_to(p, set(1.0));
+  DampedFactor damped;
+  damped.compute<kCharted>(how, set(how.damping), p, chart);
+  V w[3];
+  forward(damped.f, p.g, w);
+  return fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
+}
+
+/// Factors the points of a part, whose normal equations are p by their chart's coordinates.
+template <bool kRobust, bool kCharted>
 HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
+                            [[maybe_unused]] const MetricLess& less,
                             [[maybe_unused]] const LaneChart& chart, const GroupPart& of,
                             double* factors, EliminateSums& sums, Factor& f, V* w) {
   DampedFactor damped;
-  damped.compute<kCharted>(how, p, chart);
+  V lambda = set(how.damping);
+  if (how.own_damping != nullptr)
+    lambda = hn::Max(lambda, load(how.own_damping + 8 * of.group + of.lane()));
+  damped.compute<kCharted>(how, lambda, p, chart);
   f = damped.f;
   forward(f, p.g, w);
   const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
   sums.decrease[of.part] = hn::Add(sums.decrease[of.part], w2);
-  sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], w2);
+  V gradient2 = w2;
+  if constexpr (kRobust) gradient2 = gradient_by_weight<kCharted>(how, p, less, chart);
+  sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], gradient2);
   double* out = factors + kFactorGroup * of.group + of.lane();
   Factor x = f;
   V y[3] = {w[0], w[1], w[2]};
@@ -90,6 +131,8 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   }
   PointSums p;
   p.clear();
+  [[maybe_unused]] MetricLess less;
+  if constexpr (kRobust) less.clear();
   V square = sums.square[of.part], robust = sums.loss[of.part];
   const double* rows = nullptr;
   double* const room = Source::room(to);
@@ -98,11 +141,15 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
     LaneJacobian j = source.rows(b, scale, room + source.stride() * o);
     if constexpr (Source::kEvaluates) square = Source::add_square(j, square);
     if constexpr (kRobust) {
-      const Rho rho = apply_loss(in.how.loss, j);
+      const V s = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
+      const LossRows rows(LossLanes(in.how.loss), j.r, s);
+      const Metric metric = metric_of(rows.rho, j.r, s);
+      less.add(j, metric, kCharted ? &chart : nullptr);
+      apply_loss(rows, j);
       if constexpr (Source::kMostBlocks > 0)
-        source.scale_others(hn::Sqrt(rho.weight), room + source.stride() * o);
-      robust = hn::Add(robust, rho.value);
-      store(rho.weight, out.weights + 8 * b + of.lane());
+        source.apply_loss_to_others(rows, room + source.stride() * o);
+      robust = hn::Add(robust, rows.rho.value);
+      store_metric(metric, out.metric + kMetricBatch * b + of.lane());
     }
     if constexpr (kCharted)
       for (V* row : {j.point[0], j.point[1]}) chart.transpose(row);
@@ -113,7 +160,7 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   sums.loss[of.part] = robust;
   Factor f;
   V w[3];
-  factor_part<kCharted>(in.how, p, chart, of, out.factors, sums, f, w);
+  factor_part<kRobust, kCharted>(in.how, p, less, chart, of, out.factors, sums, f, w);
   source.write(f, w, rows, to);
 }
 

@@ -15,18 +15,12 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// Residuals and the points' rows, scaled.
-HWY_INLINE void scale_point_rows(V by, LaneJacobian& j) {
+HWY_INLINE void scale_rows(V by, LaneJacobian& j) {
   for (int r = 0; r < 2; ++r) {
     j.r[r] = hn::Mul(j.r[r], by);
     for (V& x : j.point[r]) x = hn::Mul(x, by);
-  }
-}
-
-HWY_INLINE void scale_rows(V by, LaneJacobian& j) {
-  scale_point_rows(by, j);
-  for (int r = 0; r < 2; ++r)
     for (V& x : j.camera[r]) x = hn::Mul(x, by);
+  }
 }
 
 /// The records of a chunk's batch and of what follows it.

@@ -49,16 +49,17 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
                      std::uint32_t lane, double* T, double* C, EliminateOutput& out) {
   const Batches::Group& group = in.batches->groups[g];
   const Vector3<double> X = point_of(in.points, g, lane);
-  std::array<double, 9> A{};
+  std::array<double, 9> A{}, less{};
   Vector3<double> gradient{};
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
     out.square_sum += row.square();
     if (in.loss.kind != LossKind::none) {
-      const LossValue<double> rho = row.apply(in.loss);
-      out.loss_sum += rho.value;
-      out.weights[8 * b + lane] = rho.first;
+      const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
+      add_less(metric, row.j.point.data(), less);
+      out.loss_sum += apply_loss(in.loss, row).value;
+      store_metric(metric, out.metric, b, lane);
     }
     for (int e = 0; e < 2; ++e)
       for (int i = 0; i < 3; ++i) {
@@ -67,20 +68,22 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
       }
   }
   const PointCoordinates at(in.chart, base_of(in.chart, *in.batches, group, lane, in.cameras), X);
-  const Vector3<double> D = at.damping(A, gradient, in.damping);
+  const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
+  const double gradient2 = gradient_by_weight(at, A, less, gradient, in.damping, in.points_held);
+  const Vector3<double> D = at.damping(A, gradient, lambda);
   at.damp(D, 1, A);
   Factor3 f = Factor3::of(A);
   f.held = in.points_held;
   const Vector3<double> w = f.forward(gradient.data());
   const double w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
   out.point_decrease += w2;
-  out.gradient_max2 = std::max(out.gradient_max2, w2);
+  out.gradient_max2 = std::max(out.gradient_max2, gradient2);
   store_factor(f, w, D, out.factors + kFactorGroup * g + lane);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     const std::uint64_t record = 8 * (b - chunk.first_batch) + lane;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
-    if (in.loss.kind != LossKind::none) row.scale(std::sqrt(out.weights[8 * b + lane]));
+    if (in.loss.kind != LossKind::none) apply_loss(in.loss, row);
     write_record(row, f, w, T + kTRecord * record, C + kCRecord * record);
   }
 }
@@ -191,7 +194,7 @@ void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, do
     const std::uint64_t b = group.first_batch + o;
     const Row row = row_of(batches, in.cameras, X, b, lane);
     const auto e = camera_motion(row, in.cameras + kCameraRecord * batches.image[8 * b + lane]);
-    add_to_point(row, weight_of(in.weights, b, lane), e, s);
+    add_to_point(row, metric_at(in.metric, b, lane).times(e), s);
   }
   // back_substitute gives L^-T (w - L^-1 s): taken from that of s = 0, (V + D)^-1 s is left.
   const Vector3<double> with = back_substitute(factor, s), without = back_substitute(factor, {});
@@ -203,10 +206,10 @@ void product_point(const ProductInput& in, std::size_t g, std::uint32_t lane, do
     auto e = camera_motion(row, record);
     for (int r = 0; r < 2; ++r)
       for (int i = 0; i < 3; ++i) e[r] -= row.j.point[3 * r + i] * (without[i] - with[i]);
-    const double w = weight_of(in.weights, b, lane);
+    e = metric_at(in.metric, b, lane).times(e);
     std::array<double, 9> v{};
     for (int r = 0; r < 2; ++r)
-      for (int k = 0; k < 9; ++k) v[k] += w * row.j.camera[9 * r + k] * e[r];
+      for (int k = 0; k < 9; ++k) v[k] += row.j.camera[9 * r + k] * e[r];
     const double* lens = record + camera_record::kFocal;
     v[7] /= lens[0], v[8] /= lens[0];  // to the sums s n, s n^2, and s from y_f
     v[6] -= lens[1] * v[7] + lens[2] * v[8];
@@ -248,7 +251,7 @@ void product_float(const FloatProductInput& in, const Chunk& chunk, float*, doub
     const bool inverse = field == 0 || field == 3 || field == 5;
     factors[i] = in.factors[i] * (inverse ? in.scale : 1 / in.scale);
   }
-  product({in.batches, cameras.data(), points.data(), factors.data(), in.weights}, chunk, nullptr,
+  product({in.batches, cameras.data(), points.data(), factors.data(), in.metric}, chunk, nullptr,
           y);
 }
 

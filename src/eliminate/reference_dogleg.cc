@@ -11,15 +11,15 @@
 namespace sheaf {
 namespace {
 
-/// One observation, and the weight of its loss.
+/// One observation, and the metric of its loss.
 struct WeightedRow {
   Row row;
-  double weight;
+  RowMetric metric;
   const double* record;
 
   WeightedRow(const ProductInput& in, std::size_t g, std::uint64_t b, std::uint32_t lane)
       : row(row_of(*in.batches, in.cameras, point_of(in.points, g, lane), b, lane)),
-        weight(weight_of(in.weights, b, lane)),
+        metric(metric_at(in.metric, b, lane)),
         record(in.cameras + kCameraRecord * in.batches->image[8 * b + lane]) {}
 };
 
@@ -36,7 +36,8 @@ void gradient(const ProductInput& in, const Chunk& chunk, double* sums) {
     const WeightedRow row(in, g, b, l);
     double* to = sums + kProductRecord * in.batches->image[8 * b + l];
     for (int i = 0; i < 2; ++i)
-      for (int k = 0; k < 9; ++k) to[k] -= row.weight * row.row.j.camera[9 * i + k] * row.row.r[i];
+      for (int k = 0; k < 9; ++k)
+        to[k] -= row.metric.w * row.row.j.camera[9 * i + k] * row.row.r[i];
   });
 }
 
@@ -65,10 +66,10 @@ void curvature(const CurvatureInput& in, const Chunk& chunk, CurvatureOutput& ou
     const WeightedRow row(in.state, g, b, l);
     const PointDescent point(in, g, l);
     auto e = camera_motion(row.row, row.record);
-    for (int r = 0; r < 2; ++r) {
+    for (int r = 0; r < 2; ++r)
       for (int k = 0; k < 3; ++k) e[r] += row.row.j.point[3 * r + k] * point.step[k];
-      out.square_sum += row.weight * e[r] * e[r];
-    }
+    const auto m = row.metric.times(e);
+    out.square_sum += e[0] * m[0] + e[1] * m[1];
   });
 }
 
@@ -80,7 +81,7 @@ double point_damping(const ProductInput& in, const Chunk& chunk) {
       Vector3<double> s{};
       for (std::uint32_t o = 0; o < group.track; ++o) {
         const WeightedRow row(in, g, group.first_batch + o, l);
-        add_to_point(row.row, row.weight, camera_motion(row.row, row.record), s);
+        add_to_point(row.row, row.metric.times(camera_motion(row.row, row.record)), s);
       }
       const double* factor = in.factors + kFactorGroup * g + l;
       const Vector3<double> d = back_substitute(factor, s);

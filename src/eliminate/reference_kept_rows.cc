@@ -57,7 +57,8 @@ void eliminate_point(const StoredRowsInput& in, const Chunk& chunk, std::size_t 
     normal.add(rows.back());
   }
   const ChartRules none{};
-  const EliminatedPoint p(normal, {none, {}, {}}, in.damping, in.points_held);
+  const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
+  const EliminatedPoint p(normal, {none, {}, {}}, lambda, in.points_held);
   out.point_decrease += p.decrease();
   out.gradient_max2 = std::max(out.gradient_max2, p.decrease());
   p.store(out.factors + kFactorGroup * g + lane);

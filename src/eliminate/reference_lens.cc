@@ -15,26 +15,27 @@ namespace {
 /// Columns of a block by those of the point.
 using BlockOfPoint = std::array<Vector3<double>, 9>;
 
-/// One point of a group, its observations' rows with the loss's weights in them.
+/// One point of a group, its observations' rows as the loss has them.
 struct PointTrack {
   std::size_t group;
   std::uint32_t lane;
   std::vector<LensRow> rows;
+  Matrix3<double> less{};  ///< what the loss's metric takes from V by its weight alone
 };
 
 PointTrack look_at_point(const LensEliminateInput& in, std::size_t g, std::uint32_t lane,
                          EliminateOutput& out) {
   const Batches::Group& group = in.of.batches->groups[g];
   const Vector3<double> X = point_of(in.of.at.points, g, lane);
-  PointTrack track{g, lane, {}};
+  PointTrack track{g, lane, {}, {}};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     LensRow row = lens_row(in.of, X, b, lane);
     out.square_sum += row.square();
     if (in.loss.kind != LossKind::none) {
-      const LossValue<double> rho = evaluate_loss(in.loss, row.square());
-      out.loss_sum += rho.value;
-      out.weights[8 * b + lane] = rho.first;
-      row.scale(std::sqrt(rho.first));
+      const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
+      add_less(metric, row.point[0].data(), track.less);
+      out.loss_sum += apply_loss(in.loss, row).value;
+      store_metric(metric, out.metric, b, lane);
     }
     track.rows.push_back(row);
   }
@@ -158,9 +159,12 @@ void eliminate_point(const LensEliminateInput& in, const Chunk& chunk, std::size
   const Batches& batches = *in.of.batches;
   const Vector3<double> base = base_of(in.chart, batches, batches.groups[g], lane, in.of.at.images);
   const PointCoordinates at(in.chart, base, point_of(in.of.at.points, g, lane));
-  const EliminatedPoint p(normal, at, in.damping, in.points_held);
+  const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
+  const EliminatedPoint p(normal, at, lambda, in.points_held);
   out.point_decrease += p.decrease();
-  out.gradient_max2 = std::max(out.gradient_max2, p.decrease());
+  out.gradient_max2 =
+      std::max(out.gradient_max2,
+               gradient_by_weight(at, normal.V, track.less, normal.g, in.damping, in.points_held));
   p.store(out.factors + kFactorGroup * g + lane);
   std::vector<WhitenedRow> whitened;
   const std::uint64_t batch = in.of.batches->groups[g].first_batch - chunk.first_batch;

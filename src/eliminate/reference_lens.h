@@ -19,11 +19,11 @@ struct LensRow : PointRow {
   LensJacobian<double> J;
   std::array<Block, 2> lens{};
 
-  void scale(double by) {
-    PointRow::scale(by);
+  template <class Visit>
+  void visit_columns(const Visit& visit) {
+    PointRow::visit_columns(visit);
     for (Block& block : lens)
-      for (auto& row : block)
-        for (double& x : row) x *= by;
+      for (std::size_t k = 0; k < 9; ++k) visit(block[0][k], block[1][k]);
   }
 };
 

@@ -10,14 +10,14 @@
 namespace sheaf {
 namespace {
 
-/// Calls visit(batch, row, its blocks, its weight) for the observations of a point.
+/// Calls visit(batch, row, its blocks, its metric) for the observations of a point.
 template <class Visit>
 void for_each_row(const LensProductInput& in, std::size_t g, std::uint32_t lane,
                   const Visit& visit) {
   const Batches::Group& group = in.of.batches->groups[g];
   const Vector3<double> X = point_of(in.of.at.points, g, lane);
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-    visit(lens_row(in.of, X, b, lane), BlocksOfRow(in.of, b, lane), weight_of(in.weights, b, lane));
+    visit(lens_row(in.of, X, b, lane), BlocksOfRow(in.of, b, lane), metric_at(in.metric, b, lane));
 }
 
 /// Calls visit(group, lane) for the points of a chunk.
@@ -42,11 +42,12 @@ std::array<double, 2> motion_of(const LensProductInput& in, const LensRow& row,
 
 void lens_gradient_by_reference(const LensProductInput& in, const Chunk& chunk, double* sums) {
   for_each_point(in, chunk, [&](std::size_t g, std::uint32_t l) {
-    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, double w) {
+    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, const RowMetric& m) {
       for (std::size_t k = 0; k < of.count; ++k)
         for (std::size_t r = 0; r < 2; ++r)
           for (std::size_t i = 0; i < 9; ++i)
-            sums[kProductRecord * of.block[k] + i] -= w * BlocksOfRow::row(row, k, r)[i] * row.r[r];
+            sums[kProductRecord * of.block[k] + i] -=
+                m.w * BlocksOfRow::row(row, k, r)[i] * row.r[r];
     });
   });
 }
@@ -55,21 +56,21 @@ void lens_curvature_by_reference(const LensProductInput& in, double damping, boo
                                  const Chunk& chunk, CurvatureOutput& out) {
   for_each_point(in, chunk, [&](std::size_t g, std::uint32_t l) {
     Vector3<double> gradient{}, step{};
-    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow&, double w) {
+    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow&, const RowMetric& m) {
       for (std::size_t r = 0; r < 2; ++r)
-        for (std::size_t i = 0; i < 3; ++i) gradient[i] -= w * row.point[r][i] * row.r[r];
+        for (std::size_t i = 0; i < 3; ++i) gradient[i] -= m.w * row.point[r][i] * row.r[r];
     });
     const double* factor = in.factors + kFactorGroup * g + l;
     for (std::size_t i = 0; i < 3 && !points_held; ++i) {
       step[i] = damping * gradient[i] / factor[factor_group::damping(static_cast<int>(i))];
       out.gradient2 += gradient[i] * step[i];
     }
-    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, double w) {
+    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, const RowMetric& m) {
       std::array<double, 2> e = motion_of(in, row, of);
-      for (std::size_t r = 0; r < 2; ++r) {
+      for (std::size_t r = 0; r < 2; ++r)
         for (std::size_t i = 0; i < 3; ++i) e[r] += row.point[r][i] * step[i];
-        out.square_sum += w * e[r] * e[r];
-      }
+      const std::array<double, 2> between = m.times(e);
+      out.square_sum += e[0] * between[0] + e[1] * between[1];
     });
   });
 }
@@ -78,10 +79,8 @@ double lens_point_damping_by_reference(const LensProductInput& in, const Chunk& 
   double sum = 0;
   for_each_point(in, chunk, [&](std::size_t g, std::uint32_t l) {
     Vector3<double> s{};
-    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, double w) {
-      const std::array<double, 2> e = motion_of(in, row, of);
-      for (std::size_t i = 0; i < 3; ++i)
-        s[i] += w * (row.point[0][i] * e[0] + row.point[1][i] * e[1]);
+    for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, const RowMetric& m) {
+      add_to_point(row, m.times(motion_of(in, row, of)), s);
     });
     const double* factor = in.factors + kFactorGroup * g + l;
     const Vector3<double> d = back_substitute(factor, s);
@@ -98,12 +97,14 @@ void keep_lens_rows_by_reference(const LensProductInput& in, double unit, const 
     const Batches::Group& group = in.of.batches->groups[g];
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
       for (std::uint32_t l = 0; l < 8; ++l) {
-        const LensRow row = lens_row(in.of, point_of(in.of.at.points, g, l), b, l);
-        const double root = l < group.lanes ? std::sqrt(weight_of(in.weights, b, l)) : 0;
+        LensRow row = lens_row(in.of, point_of(in.of.at.points, g, l), b, l);
+        const RowMetric metric = metric_at(in.metric, b, l);
+        row.visit_columns([&](double& j0, double& j1) {
+          const std::array<double, 2> e = metric.root_times({j0, j1});
+          j0 = l < group.lanes ? e[0] : 0, j1 = l < group.lanes ? e[1] : 0;
+        });
         float* to = rows + 8 * kept_row::fields(blocks) * b + l;
-        const auto keep = [&](double x, int field) {
-          to[8 * field] = static_cast<float>(root * x);
-        };
+        const auto keep = [&](double x, int field) { to[8 * field] = static_cast<float>(x); };
         for (int r = 0; r < 2; ++r) {
           const auto e = static_cast<std::size_t>(r);
           for (int i = 0; i < 3; ++i)

@@ -50,7 +50,7 @@ struct LensTrial {
   }
 };
 
-/// Of one point: e = Jc x, u = (V + D)^-1 sum Jp^T w e, y += Jc^T w (e - Jp u).
+/// Of one point: e = Jc x, u = (V + D)^-1 sum Jp^T M e, y += Jc^T M (e - Jp u).
 void multiply_point(const LensProductInput& in, std::size_t g, std::uint32_t lane, double* y) {
   const Batches::Group& group = in.of.batches->groups[g];
   const Vector3<double> X = point_of(in.of.at.points, g, lane);
@@ -65,7 +65,7 @@ void multiply_point(const LensProductInput& in, std::size_t g, std::uint32_t lan
   Vector3<double> s{};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     const LensRow row = lens_row(in.of, X, b, lane);
-    add_to_point(row, weight_of(in.weights, b, lane), along(row, {in.of, b, lane}), s);
+    add_to_point(row, metric_at(in.metric, b, lane).times(along(row, {in.of, b, lane})), s);
   }
   // back_substitute gives L^-T (w - L^-1 s): taken from that of s = 0, (V + D)^-1 s is left.
   const double* factor = in.factors + kFactorGroup * g + lane;
@@ -74,13 +74,13 @@ void multiply_point(const LensProductInput& in, std::size_t g, std::uint32_t lan
     const LensRow row = lens_row(in.of, X, b, lane);
     const BlocksOfRow of(in.of, b, lane);
     std::array<double, 2> e = along(row, of);
-    for (std::size_t r = 0; r < 2; ++r) {
+    for (std::size_t r = 0; r < 2; ++r)
       for (std::size_t i = 0; i < 3; ++i) e[r] -= row.point[r][i] * (without[i] - with[i]);
+    e = metric_at(in.metric, b, lane).times(e);
+    for (std::size_t r = 0; r < 2; ++r)
       for (std::size_t k = 0; k < of.count; ++k)
         for (std::size_t i = 0; i < 9; ++i)
-          y[kProductRecord * of.block[k] + i] +=
-              weight_of(in.weights, b, lane) * BlocksOfRow::row(row, k, r)[i] * e[r];
-    }
+          y[kProductRecord * of.block[k] + i] += BlocksOfRow::row(row, k, r)[i] * e[r];
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "eliminate/kernels.h"
 #include "eliminate/reference_rows.h"
+#include "geometry/row_metric.h"
 #include "rows/reference_row.h"
 
 namespace sheaf {
@@ -84,10 +85,9 @@ struct WhitenedRow {
   }
 };
 
-/// s += Jp^T w e.
-inline void add_to_point(const PointRow& row, double w, const std::array<double, 2>& e,
-                         Vector3<double>& s) {
-  for (std::size_t i = 0; i < 3; ++i) s[i] += w * (row.point[0][i] * e[0] + row.point[1][i] * e[1]);
+/// s += Jp^T e.
+inline void add_to_point(const PointRow& row, const std::array<double, 2>& e, Vector3<double>& s) {
+  for (std::size_t i = 0; i < 3; ++i) s[i] += row.point[0][i] * e[0] + row.point[1][i] * e[1];
 }
 
 /// T = Jc^T B, C = Lm^T Jc and h, as records have them.

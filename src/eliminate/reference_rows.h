@@ -8,6 +8,7 @@
 
 #include "eliminate/kernels.h"
 #include "geometry/bal_camera.h"
+#include "geometry/row_metric.h"
 
 namespace sheaf {
 
@@ -42,16 +43,10 @@ struct Row {
   BalJacobian<double> j;
 
   double square() const { return r[0] * r[0] + r[1] * r[1]; }
-  /// Times sqrt(rho'); returns rho of what it was.
-  LossValue<double> apply(const ScaledLoss& loss) {
-    const LossValue<double> rho = evaluate_loss(loss, square());
-    scale(std::sqrt(rho.first));
-    return rho;
-  }
-  void scale(double by) {
-    for (double& x : r) x *= by;
-    for (double& x : j.camera) x *= by;
-    for (double& x : j.point) x *= by;
+  template <class Visit>
+  void visit_columns(const Visit& visit) {
+    for (std::size_t k = 0; k < 9; ++k) visit(j.camera[k], j.camera[9 + k]);
+    for (std::size_t k = 0; k < 3; ++k) visit(j.point[k], j.point[3 + k]);
   }
 };
 
@@ -193,14 +188,50 @@ inline std::array<double, 2> camera_motion(const Row& row, const double* record)
   return e;
 }
 
-inline double weight_of(const double* weights, std::uint64_t batch, std::uint32_t lane) {
-  return weights == nullptr ? 1 : weights[8 * batch + lane];
+inline RowMetric metric_at(const double* metric, std::uint64_t batch, std::uint32_t lane) {
+  if (metric == nullptr) return {};
+  const double* at = metric + kMetricBatch * batch + lane;
+  return {at[metric_batch::kWeight], {at[metric_batch::kAlong], at[metric_batch::kAlong + 8]}};
+}
+inline void store_metric(const RowMetric& m, double* metric, std::uint64_t batch,
+                         std::uint32_t lane) {
+  double* at = metric + kMetricBatch * batch + lane;
+  at[metric_batch::kWeight] = m.w;
+  for (std::size_t e = 0; e < 2; ++e) at[metric_batch::kAlong + 8 * e] = m.u[e];
 }
 
-/// s += Jp^T w e.
-inline void add_to_point(const Row& row, double w, const std::array<double, 2>& e,
-                         Vector3<double>& s) {
-  for (int i = 0; i < 3; ++i) s[i] += w * (row.j.point[i] * e[0] + row.j.point[3 + i] * e[1]);
+/// less += (Jp^T u) (Jp^T u)^T: what a loss's metric takes from V by its weight alone. point: Jp,
+/// row by row.
+inline void add_less(const RowMetric& metric, const double* point, Matrix3<double>& less) {
+  Vector3<double> a;
+  for (std::size_t i = 0; i < 3; ++i) a[i] = metric.u[0] * point[i] + metric.u[1] * point[3 + i];
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k) less[3 * i + k] += a[i] * a[k];
+}
+
+/// |L^-1 g|^2 by the weight of the loss alone, V + less = L L^T but for the damping.
+inline double gradient_by_weight(const PointCoordinates& at, const Matrix3<double>& V,
+                                 const Matrix3<double>& less, const Vector3<double>& g,
+                                 double lambda, bool held) {
+  Matrix3<double> A = V;
+  for (std::size_t i = 0; i < 9; ++i) A[i] += less[i];
+  const Vector3<double> D = at.damping(A, g, lambda);
+  at.damp(D, 1, A);
+  Factor3 f = Factor3::of(A);
+  f.held = held;
+  const Vector3<double> w = f.forward(g.data());
+  return w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+}
+
+/// The largest of the common damping and the point's own.
+inline double damping_of_point(double common, const double* own, std::size_t g,
+                               std::uint32_t lane) {
+  return own == nullptr ? common : std::max(common, own[8 * g + lane]);
+}
+
+/// s += Jp^T e.
+inline void add_to_point(const Row& row, const std::array<double, 2>& e, Vector3<double>& s) {
+  for (int i = 0; i < 3; ++i) s[i] += row.j.point[i] * e[0] + row.j.point[3 + i] * e[1];
 }
 
 inline Vector3<double> back_substitute(const double* factor, const Vector3<double>& s) {

@@ -27,10 +27,12 @@ inline Vector3<double> blended(const PointBlend& blend, const double* factor,
   return step;
 }
 
-/// What a point costs where it stands, and its normal equations there.
+/// What a point costs where it stands, and its normal equations there: by the weight of the loss
+/// alone, and what its metric takes from V.
 struct PointCost {
   double square = 0, cost = 0;
   PointNormal normal;
+  Matrix3<double> less{};
 };
 
 template <class Of>
@@ -40,15 +42,20 @@ PointCost cost_at(const Of& of, const Batches::Group& group, const Vector3<doubl
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     auto row = of.tried().row(b, lane, X);
     const LossValue<double> rho = evaluate_loss(of.in.loss, row.square());
+    const RowMetric metric = metric_of(of.in.loss, rho, row.r);
     out.square += row.square();
     out.cost += rho.value;
-    row.scale(std::sqrt(rho.first));
+    add_less(metric, row.point[0].data(), out.less);
+    const double root = std::sqrt(rho.first);
+    for (double& r : row.r) r *= root;
+    row.visit_columns([root](double& j0, double& j1) { j0 *= root, j1 *= root; });
     out.normal.add(row);
   }
   return out;
 }
 
-/// Inner iterations (eliminate/kernels.h) of one point from X; returns the cost where it ends.
+/// Inner iterations (eliminate/kernels.h) of one point from X without a loss; returns the cost
+/// where it ends.
 template <class Of>
 PointCost refine_point(const Of& of, const Batches::Group& group, std::uint32_t lane,
                        const double* factor, const Vector3<double>& base,
@@ -79,16 +86,58 @@ PointCost refine_point(const Of& of, const Batches::Group& group, std::uint32_t 
   return best;
 }
 
+/// A point's own Levenberg-Marquardt under a loss (eliminate/kernels.h) from the cheaper of X and
+/// `stay`; returns the cost where it ends. own: its damping from step to step.
+template <class Of>
+PointCost settle_point(const Of& of, const Batches::Group& group, std::uint32_t lane,
+                       const double* factor, const Vector3<double>& base,
+                       const Vector3<double>& stay, double& own, Vector3<double>& X,
+                       double& left_decrease) {
+  using namespace inner_iterations;
+  PointCost best = cost_at(of, group, X, lane);
+  const PointCost there = cost_at(of, group, stay, lane);
+  const double lambda = of.in.own.damping;
+  const bool fell = !(best.cost <= there.cost);
+  own = next_own_damping(fell, lambda, own);
+  if (fell) {
+    X = stay, best = there;
+    for (int i = 0; i < 3; ++i)
+      left_decrease += factor[factor_group::w(i)] * factor[factor_group::w(i)];
+  }
+  double damping = std::max(own, of.in.blend.inner_damping * lambda);
+  bool metric = true;
+  for (int tries = kTries * of.in.inner_iterations; tries > 0; --tries) {
+    const PointCoordinates at(of.in.chart, base, X);
+    const Vector3<double> v = at.diagonal(best.normal.V);
+    Vector3<double> D = at.damping(best.normal.V, best.normal.g, damping);
+    for (std::size_t i = 0; i < 3; ++i) D[i] += 1e-12 * v[i];
+    Matrix3<double> A = best.normal.V;
+    for (std::size_t i = 0; i < 9 && metric; ++i) A[i] -= best.less[i];
+    at.damp(D, 1, A);
+    const Factor3 f = Factor3::of(A);
+    const Vector3<double> w = f.forward(best.normal.g.data());
+    const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+    if (!(decrease > of.in.own.worth * of.in.mean_square * group.track)) break;
+    const Vector3<double> Y = at.step(f.backward(w), base);
+    const PointCost tried = cost_at(of, group, Y, lane);
+    const bool better = tried.cost < best.cost;
+    if (!metric) damping = better ? 0.2 * damping : std::max(10 * damping, kLeastOwn);
+    if (better) X = Y, best = tried;
+    metric = better;
+  }
+  return best;
+}
+
 /// The point's step d as back-substitution has it.
 template <class Of>
 Vector3<double> step_of_point(const Of& of, std::size_t g, std::uint32_t lane,
                               const Vector3<double>& X) {
   const Batches::Group& group = of.in.batches->groups[g];
-  const double* weights = of.in.loss.kind == LossKind::none ? nullptr : of.in.weights;
+  const double* metric = of.in.loss.kind == LossKind::none ? nullptr : of.in.metric;
   Vector3<double> s{};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     const auto row = of.held().row(b, lane, X);
-    add_to_point(row, weight_of(weights, b, lane), of.held().step(row, b, lane), s);
+    add_to_point(row, metric_at(metric, b, lane).times(of.held().step(row, b, lane)), s);
   }
   return back_substitute(of.in.factors + kFactorGroup * g + lane, s);
 }
@@ -111,7 +160,11 @@ void try_point(const Of& of, std::size_t g, std::uint32_t lane, TrialOutput& out
   Vector3<double> Y = at.step(blended(of.in.blend, factor, d), moved);
   const Vector3<double> stay =
       at.step({moved[0] - at.base[0], moved[1] - at.base[1], moved[2] - at.base[2]}, moved);
-  const PointCost cost = refine_point(of, group, lane, factor, moved, stay, Y);
+  const bool settles = of.in.loss.kind != LossKind::none && of.in.inner_iterations > 0;
+  const PointCost cost = settles
+                             ? settle_point(of, group, lane, factor, moved, at.plain() ? X : stay,
+                                            out.own_damping[8 * g + lane], Y, out.left_decrease)
+                             : refine_point(of, group, lane, factor, moved, stay, Y);
   double d2 = 0, x2 = 1e-300;
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);

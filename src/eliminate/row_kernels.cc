@@ -28,8 +28,9 @@ void eliminate_rows(const StoredRowsInput& in, const Chunk& chunk, const Records
                     EliminateOutput& out) {
   with_kept(in.rows, [&](auto* kept) {
     eliminate_chunk<SourceOf<decltype(kept)>, false, false>(
-        {{in.batches, &in.rows, nullptr, nullptr, in.poses}, {in.damping, in.points_held}}, chunk,
-        records, out);
+        {{in.batches, &in.rows, nullptr, nullptr, in.poses},
+         {in.damping, in.points_held, {}, {}, in.own_damping}},
+        chunk, records, out);
   });
 }
 

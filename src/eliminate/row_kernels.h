@@ -25,6 +25,7 @@ struct StoredRowsInput {
   double damping;  ///< as in EliminateInput
   bool points_held;
   bool poses;  ///< blocks are poses alone: records are for pose_diagonal and pose pairs
+  const double* own_damping = nullptr;  ///< as EliminateInput
 };
 
 struct RowTrialInput {

@@ -18,17 +18,19 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// e = w Jc x of one observation per lane (also saved), and s += Jp^T e; weight: nullptr for w = 1
-/// in all lanes.
-template <class C, class W>
-HWY_INLINE void first_sweep(const C& c, W X0, W X1, W X2, const W* weight, hn::TFromV<W>* saved,
+/// e = M Jc x of one observation per lane (also saved), and s += Jp^T e; mask: nullptr for lanes
+/// that are all used. metric: read with a loss alone.
+template <bool Robust, class C, class W>
+HWY_INLINE void first_sweep(const C& c, W X0, W X1, W X2, const W* mask,
+                            [[maybe_unused]] const MetricAs<W>& metric, hn::TFromV<W>* saved,
                             W* s) {
   const SeenAs<W> seen = see(c, X0, X1, X2);
   const W fd = hn::Mul(c[camera_record::kFocal], distortion(c, seen.n));
   const W dd = distortion_slope(c, seen.n);
   W e0, e1;
   camera_motion(c, seen, fd, dd, e0, e1);
-  if (weight != nullptr) e0 = hn::Mul(e0, *weight), e1 = hn::Mul(e1, *weight);
+  if constexpr (Robust) metric.apply(e0, e1);
+  if (mask != nullptr) e0 = hn::Mul(e0, *mask), e1 = hn::Mul(e1, *mask);
   const hn::DFromV<W> d;
   const std::size_t lanes = hn::Lanes(d);
   hn::Store(seen.iz, d, saved), hn::Store(seen.x, d, saved + lanes);
@@ -38,11 +40,11 @@ HWY_INLINE void first_sweep(const C& c, W X0, W X1, W X2, const W* weight, hn::T
   add_to_point(c, seen, fd, dd, e0, e1, s);
 }
 
-/// v = Jc^T (e - w Jp u), in the order of the product's record: rho (3), phi (3), then the sums of
+/// v = Jc^T (e - M Jp u), in the order of the product's record: rho (3), phi (3), then the sums of
 /// s, s n and s n^2 with s = p . e that make up the intrinsics.
 template <bool Robust, class W>
-HWY_INLINE void second_sweep(const hn::TFromV<W>* rotation, const hn::TFromV<W>* saved, W w,
-                             const W* u, W* v) {
+HWY_INLINE void second_sweep(const hn::TFromV<W>* rotation, const hn::TFromV<W>* saved,
+                             [[maybe_unused]] const MetricAs<W>& metric, const W* u, W* v) {
   const hn::DFromV<W> d;
   const std::size_t lanes = hn::Lanes(d);
   const auto R = [&](int i) { return hn::Load(d, rotation + i * lanes); };
@@ -51,11 +53,11 @@ HWY_INLINE void second_sweep(const hn::TFromV<W>* rotation, const hn::TFromV<W>*
   const W m0 = fma(R(0), u[0], fma(R(1), u[1], hn::Mul(R(2), u[2])));
   const W m1 = fma(R(3), u[0], fma(R(4), u[1], hn::Mul(R(5), u[2])));
   const W m2 = fma(R(6), u[0], fma(R(7), u[1], hn::Mul(R(8), u[2])));
-  const W wz = Robust ? hn::Mul(iz, w) : iz;
-  const W dx = hn::Mul(wz, fma(x, m2, m0)), dy = hn::Mul(wz, fma(y, m2, m1));
+  const W dx = hn::Mul(iz, fma(x, m2, m0)), dy = hn::Mul(iz, fma(y, m2, m1));
   const W along = hn::Mul(dd, fma(x, dx, hn::Mul(y, dy)));
-  const W e0 = hn::Sub(field(5), fma(fd, dx, hn::Mul(along, x)));
-  const W e1 = hn::Sub(field(6), fma(fd, dy, hn::Mul(along, y)));
+  W p0 = fma(fd, dx, hn::Mul(along, x)), p1 = fma(fd, dy, hn::Mul(along, y));
+  if constexpr (Robust) metric.apply(p0, p1);
+  const W e0 = hn::Sub(field(5), p0), e1 = hn::Sub(field(6), p1);
   const W s = fma(x, e0, hn::Mul(y, e1));
   const W t = hn::Mul(dd, s);
   // A^T e = iz (g0, g1, g2), and P x A^T e with iz P = (x, y, -1).
@@ -113,9 +115,10 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
                                            batches.uniform[b], c);
       double* to = saved + kPart * (kParts * o + part);
       for (int i = 0; i < 9; ++i) store(c[i], to + i * kLanes);
-      V weight = mask;
-      if constexpr (Robust) weight = hn::Mul(mask, load(in.weights + 8 * b + lane));
-      first_sweep(c, X0, X1, X2, Robust || group.lanes < 8 ? &weight : nullptr, to + 9 * kLanes, s);
+      Metric metric;
+      if constexpr (Robust) metric = load_metric(in.metric + kMetricBatch * b + lane);
+      first_sweep<Robust>(c, X0, X1, X2, group.lanes < 8 ? &mask : nullptr, metric, to + 9 * kLanes,
+                          s);
     }
     solve_point(in.factors + kFactorGroup * g + lane, s, u[part]);
   }
@@ -125,9 +128,9 @@ HWY_INLINE void product_group(const ProductInput& in, const Batches::Group& grou
     for (int part = 0; part < kParts; ++part) {
       V v[9];
       const double* from = saved + kPart * (kParts * o + part);
-      V weight = zero();  // not read without a loss
-      if constexpr (Robust) weight = load(in.weights + 8 * b + part * kLanes);
-      second_sweep<Robust>(from, from + 9 * kLanes, weight, u[part], v);
+      Metric metric;
+      if constexpr (Robust) metric = load_metric(in.metric + kMetricBatch * b + part * kLanes);
+      second_sweep<Robust>(from, from + 9 * kLanes, metric, u[part], v);
       store_records(v, rows + 8 * part * kLanes, 8);
       store(v[8], ninth + part * kLanes);
     }

@@ -12,6 +12,11 @@ namespace sheaf {
 struct ScaledLoss {
   LossKind kind = LossKind::none;
   double scale_px = 1;
+  /// Of the curvature along a residual, as a part of its weight: what steps see of it is not below
+  /// (geometry/row_metric.h). 1: the weight alone. Costs do not depend on it.
+  double floor = 1;
+
+  friend bool operator==(const ScaledLoss&, const ScaledLoss&) = default;
 };
 
 /// rho at s = |r|^2 (px^2), and its derivatives by s.

@@ -30,6 +30,13 @@ constexpr int w(int i) { return 8 * (6 + i); }
 constexpr int damping(int i) { return 8 * (9 + i); }
 }  // namespace factor_group
 
+/// What a loss makes of the rows of a batch, M = w I - u u^T of eight lanes
+/// (geometry/row_metric.h): w, then the two components of u.
+constexpr std::size_t kMetricBatch = 24;
+namespace metric_batch {
+constexpr int kWeight = 0, kAlong = 8;
+}
+
 // The state of images and lenses as kernels read it.
 
 /// What the records of images of every kind begin with: R (9, row-major), t (3).

@@ -66,7 +66,8 @@ Table solver_fields() {
                 .placeholder = "N",
                 .range = from(0),
                 .help = "at most so many Gauss-Newton steps of each point by itself in every step, "
-                        "once the cameras have stepped; 0: none"}),
+                        "once the cameras have stepped; under a loss, tries of a "
+                        "Levenberg-Marquardt, three for one of these; 0: none"}),
       F::choice(&SolveOptions::simd,
                 {{Simd::best, "best"},
                  {Simd::scalar, "scalar"},

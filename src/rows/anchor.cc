@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/row_metric.h"
+
 namespace sheaf {
 
 AnchorRow anchor_row(const Anchor& anchor, const Pinhole& camera, const double* view,
@@ -25,14 +27,19 @@ AnchorRow anchor_row(const Anchor& anchor, const Pinhole& camera, const double* 
   const auto rho = evaluate_loss(anchor.loss, e[0] * e[0] + e[1] * e[1]);
   out.cost = weight2 * rho.value;
   out.square = weight2 * (e[0] * e[0] + e[1] * e[1]);
-  const double weight = anchor.sigma_grey * std::sqrt(rho.first);
   // A = du/dP: by rho s A, by phi P x A, by the world point A R, by the inverse depth A t.
-  const double fx = weight * camera.fx / (anchor.sigma_px * P[2]);
-  const double fy = weight * camera.fy / (anchor.sigma_px * P[2]);
-  const double A[2][3] = {{fx, 0, -fx * x}, {0, fy, -fy * y}};
+  const double fx = anchor.sigma_grey * camera.fx / (anchor.sigma_px * P[2]);
+  const double fy = anchor.sigma_grey * camera.fy / (anchor.sigma_px * P[2]);
+  double A[2][3] = {{fx, 0, -fx * x}, {0, fy, -fy * y}};
+  const RowMetric metric = metric_of(anchor.loss, rho, {e[0], e[1]});
+  for (int i = 0; i < 3; ++i) {
+    const auto column = metric.root_times({A[0][i], A[1][i]});
+    A[0][i] = column[0], A[1][i] = column[1];
+  }
+  const double phi = curvature_along(anchor.loss, rho, e[0] * e[0] + e[1] * e[1]);
   for (int r = 0; r < 2; ++r) {
     const double* a = A[r];
-    out.residual[r] = weight * e[r];
+    out.residual[r] = anchor.sigma_grey * std::sqrt(rho.first / phi) * e[r];
     for (int i = 0; i < 3; ++i) {
       out.camera[r][i] = s * a[i];
       const int j = (i + 1) % 3, k = (i + 2) % 3;

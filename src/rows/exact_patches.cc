@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "geometry/row_metric.h"
 #include "lists/block_layout.h"
 #include "rows/row_layout.h"
 
@@ -76,7 +77,24 @@ struct PatchCost {
   double rho = 0, square = 0;
 };
 
-/// The weighted rows of a patch's pixels.
+/// The rows of a loss on a patch as one vector r, s = |r|^2: N J and its residual
+/// (geometry/row_metric.h). Returns rho.
+double apply_patch_loss(const ScaledLoss& loss, double s, std::vector<PixelRow>& rows) {
+  const LossValue<double> rho = evaluate_loss(loss, s);
+  const double phi = curvature_along(loss, rho, s), root = std::sqrt(rho.first);
+  PixelRow b{};
+  for (const PixelRow& row : rows)
+    for (std::size_t k = 0; k < kResidual; ++k) b[k] += row[k] * row[kResidual];
+  const double shorter = s > 0 ? (1 - std::sqrt(phi)) / s : 0;
+  for (PixelRow& row : rows) {
+    for (std::size_t k = 0; k < kResidual; ++k)
+      row[k] = root * (row[k] - shorter * row[kResidual] * b[k]);
+    row[kResidual] *= root / std::sqrt(phi);
+  }
+  return rho.value;
+}
+
+/// The rows of a patch's pixels, by the loss's metric.
 PatchCost list_pixels(const PatchLane& patch, std::vector<PixelRow>& rows) {
   const PhotometricInput& in = patch.in;
   const PatchGrid& grid = *in.grid;
@@ -88,25 +106,23 @@ PatchCost list_pixels(const PatchLane& patch, std::vector<PixelRow>& rows) {
     const auto u = patch.project(P);
     const GreySample grey = sample(patch.plane, in.taps, u[0], u[1]);
     const double g = patch.reference[cell], r = grey.value - (alpha * g + beta);
-    double weight = 1;
+    double weight = 1, along = 1;
     cost.square += r * r;
     if (!in.loss_per_patch) {
       const auto rho = evaluate_loss(in.loss, r * r);
       cost.rho += rho.value;
-      weight = std::sqrt(rho.first);
+      along = curvature_along(in.loss, rho, r * r);
+      weight = std::sqrt(rho.first * along);
     }
     const double a0 = weight * grey.dx * in.camera.fx / P[2];
     const double a1 = weight * grey.dy * in.camera.fy / P[2];
     const double a2 = -(a0 * P[0] + a1 * P[1]) / P[2];
     const double bright = in.brightness ? -weight : 0;
     rows.push_back({a0, a1, a2, P[1] * a2 - P[2] * a1, P[2] * a0 - P[0] * a2, P[0] * a1 - P[1] * a0,
-                    bright * g, bright, weight * r});
+                    bright * g, bright, weight * r / along});
   }
   if (!in.loss_per_patch) return cost;
-  const auto rho = evaluate_loss(in.loss, cost.square);
-  cost.rho = rho.value;
-  for (PixelRow& row : rows)
-    for (double& x : row) x *= std::sqrt(rho.first);
+  cost.rho = apply_patch_loss(in.loss, cost.square, rows);
   return cost;
 }
 

@@ -9,7 +9,7 @@
 #define SHEAF_RESIDUAL_PATCH_SUMS_INL_H_
 #endif
 
-#include "rows/loss_lanes-inl.h"
+#include "rows/metric_lanes-inl.h"
 #include "rows/patch_rows-inl.h"
 #include "rows/photometric.h"
 #include "rows/rows-inl.h"
@@ -18,9 +18,11 @@ HWY_BEFORE_NAMESPACE();
 namespace sheaf {
 namespace HWY_NAMESPACE {
 
-/// Sums over a patch's pixels: of rho and, not weighted, of r^2; then, weighted by the loss,
-/// products of the slopes gx, gy, the residual r, the reference's grey g and one. Those from kGxg
-/// on are for the brightness.
+/// Sums over a patch's pixels: of rho and, not weighted, of r^2; then products of the slopes gx,
+/// gy, the residual r, the reference's grey g and one. Those with r are weighted by rho', which
+/// makes the gradient that of the loss; the others by rho' phi, its curvature
+/// (geometry/row_metric.h: a pixel has one row, along its residual). Those from kGxg on are for the
+/// brightness.
 enum PatchSum {
   kCost,
   kSquare,
@@ -113,13 +115,14 @@ HWY_INLINE void add_pixels(const LanePixels& at, const Look& look, [[maybe_unuse
   const V g = at.reference, gx = at.gx, gy = at.gy;
   V r = hn::Sub(at.grey, fma(look.alpha, g, look.beta)), wx = gx, wy = gy;
   if constexpr (kMasked) r = hn::Mul(mask, r), wx = hn::Mul(mask, gx), wy = hn::Mul(mask, gy);
-  const V square = hn::Mul(r, r);
+  const V square = hn::Mul(r, r), x = wx, y = wy;
   V w = kMasked ? mask : set(1.0);
   if constexpr (kWeigh) {
     V rho = square;
     if (look.weigh) {
       const Rho of = rho_lanes(look.loss, square);
-      w = hn::Mul(w, of.weight), rho = of.value;
+      r = hn::Mul(of.weight, r), rho = of.value;
+      w = hn::Mul(hn::Mul(w, of.weight), of.along);
       wx = hn::Mul(w, gx), wy = hn::Mul(w, gy);
     }
     sums[kCost] = hn::Add(rho, sums[kCost]);
@@ -127,8 +130,8 @@ HWY_INLINE void add_pixels(const LanePixels& at, const Look& look, [[maybe_unuse
   sums[kGxx] = fma(wx, gx, sums[kGxx]);
   sums[kGxy] = fma(wx, gy, sums[kGxy]);
   sums[kGyy] = fma(wy, gy, sums[kGyy]);
-  sums[kGxr] = fma(wx, r, sums[kGxr]);
-  sums[kGyr] = fma(wy, r, sums[kGyr]);
+  sums[kGxr] = fma(x, r, sums[kGxr]);
+  sums[kGyr] = fma(y, r, sums[kGyr]);
   sums[kSquare] = hn::Add(square, sums[kSquare]);
   if constexpr (kBrightness) {
     const V wg = hn::Mul(w, g);
@@ -139,9 +142,27 @@ HWY_INLINE void add_pixels(const LanePixels& at, const Look& look, [[maybe_unuse
     sums[kGg] = fma(wg, g, sums[kGg]);
     sums[kG1] = hn::Add(wg, sums[kG1]);
     sums[k11] = hn::Add(w, sums[k11]);
-    sums[kGr] = fma(wg, r, sums[kGr]);
-    sums[k1r] = fma(w, r, sums[k1r]);
+    sums[kGr] = fma(g, r, sums[kGr]);
+    sums[k1r] = hn::Add(r, sums[k1r]);
   }
+}
+
+/// A loss on a patch as one vector: with J^T r = b, its J^T M J = w (J^T J - (1 - phi) / s b b^T).
+template <bool kBrightness>
+HWY_INLINE V apply_patch_loss(const ScaledLoss& loss, V* sums) {
+  const V s = sums[kSquare];
+  const Rho rho = rho_lanes(LossLanes(loss), s);
+  const V less = over_square(hn::Sub(set(1.0), rho.along), s);
+  const V x = hn::Mul(less, sums[kGxr]), y = hn::Mul(less, sums[kGyr]);
+  const auto take = [sums](int at, V a, int b) { sums[at] = fnma(a, sums[b], sums[at]); };
+  take(kGxx, x, kGxr), take(kGxy, x, kGyr), take(kGyy, y, kGyr);
+  if constexpr (kBrightness) {
+    const V g = hn::Mul(less, sums[kGr]), one = hn::Mul(less, sums[k1r]);
+    take(kGxg, x, kGr), take(kGyg, y, kGr), take(kGx1, x, k1r), take(kGy1, y, k1r);
+    take(kGg, g, kGr), take(kG1, g, k1r), take(k11, one, k1r);
+  }
+  for (int k = kGxx; k < kPatchSums<kBrightness>; ++k) sums[k] = hn::Mul(sums[k], rho.weight);
+  return rho.value;
 }
 
 }  // namespace HWY_NAMESPACE

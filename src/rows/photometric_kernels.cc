@@ -137,11 +137,7 @@ HWY_INLINE void collapse_part(const PhotometricInput& in, const Walk& walk, Aim&
     sum_translated_lanes<kBrightness>(in, aim.pixels, aim.at, aim.alpha, aim.beta, scratch, of);
   }
   V cost = of[kCost];
-  if (in.loss_per_patch) {
-    const Rho rho = rho_lanes(LossLanes(in.loss), of[kSquare]);
-    cost = rho.value;
-    for (int k = kGxx; k < kPatchSums<kBrightness>; ++k) of[k] = hn::Mul(of[k], rho.weight);
-  }
+  if (in.loss_per_patch) cost = apply_patch_loss<kBrightness>(in.loss, of);
   V square = of[kSquare];
   const auto fits = hn::Gt(load(inside), zero());
   const bool all_fit = hn::AllTrue(D(), fits);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/row_metric.h"
 #include "lists/block_layout.h"
 #include "rows/reference_patch.h"
 #include "rows/row_layout.h"
@@ -93,24 +94,28 @@ PointRow patch_rows(const PatchLane& patch, const PatchFactor& factor) {
 
 namespace {
 
-/// Of a patch's pixels, weighted by the loss: G = J^T J and b = J^T r of the columns gx, gy, -g and
-/// -1; and not weighted, the sum of r^2.
+/// Of a patch's pixels by the loss's metric: G = J^T M J and b = w J^T r of the columns gx, gy, -g
+/// and -1; and not weighted, the sum of r^2.
 struct PatchGram {
   std::array<std::array<double, 4>, 4> G{};
   std::array<double, 4> b{};
   double cost = 0, square = 0;
 
-  void add(const std::array<double, 4>& J, double r, double weight) {
+  /// along: phi, a part of the weight.
+  void add(const std::array<double, 4>& J, double r, double weight, double along) {
     for (std::size_t i = 0; i < 4; ++i) {
       b[i] += weight * J[i] * r;
-      for (std::size_t k = 0; k < 4; ++k) G[i][k] += weight * J[i] * J[k];
+      for (std::size_t k = 0; k < 4; ++k) G[i][k] += weight * along * J[i] * J[k];
     }
   }
-  void scale(double by) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      b[i] *= by;
-      for (double& x : G[i]) x *= by;
-    }
+  /// A loss on all of them as one vector.
+  void apply(const ScaledLoss& loss) {
+    const LossValue<double> rho = evaluate_loss(loss, square);
+    const double less = square > 0 ? (1 - curvature_along(loss, rho, square)) / square : 0;
+    cost = rho.value;
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t k = 0; k < 4; ++k) G[i][k] = rho.first * (G[i][k] - less * b[i] * b[k]);
+    for (double& x : b) x *= rho.first;
   }
 };
 
@@ -131,12 +136,10 @@ PatchGram sum_pixels(const PatchLane& patch) {
         in.loss_per_patch ? LossValue<double>{r * r, 1, 0} : evaluate_loss(in.loss, r * r);
     out.square += r * r;
     out.cost += rho.value;
-    out.add({grey.dx, grey.dy, -g, -1}, r, rho.first);
+    const double along = in.loss_per_patch ? 1 : curvature_along(in.loss, rho, r * r);
+    out.add({grey.dx, grey.dy, -g, -1}, r, rho.first, along);
   }
-  if (!in.loss_per_patch) return out;
-  const LossValue<double> rho = evaluate_loss(in.loss, out.square);
-  out.cost = rho.value;
-  out.scale(rho.first);
+  if (in.loss_per_patch) out.apply(in.loss);
   return out;
 }
 

@@ -15,12 +15,10 @@ struct PointRow {
   std::array<std::array<double, 3>, 2> point{};
 
   double square() const { return r[0] * r[0] + r[1] * r[1]; }
-  void scale(double by) {
-    for (std::size_t e = 0; e < 2; ++e) {
-      r[e] *= by;
-      for (double& x : camera[e]) x *= by;
-      for (double& x : point[e]) x *= by;
-    }
+  template <class Visit>
+  void visit_columns(const Visit& visit) {
+    for (std::size_t k = 0; k < 9; ++k) visit(camera[0][k], camera[1][k]);
+    for (std::size_t k = 0; k < 3; ++k) visit(point[0][k], point[1][k]);
   }
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "geometry/loss.h"
 #include "solve/trust_region.h"
@@ -12,12 +13,18 @@
 namespace sheaf {
 namespace {
 
-constexpr int kMostEstimates = 5;
-constexpr double kSettled = 0.05;
-/// A provisional round ends with its first accepted step: while the scale is wide, outliers pull
-/// hard. Going on until two steps gain less than half each pulls a camera of trafalgar-21 (10%
-/// outliers of 50 px, Huber) into another minimum, with three times the rotation error.
+/// A provisional scale is estimated anew after each accepted step: while it is wide, outliers pull
+/// hard. Once a step gains less than kSettledDecrease of the cost and the scale that is asked for
+/// then differs by less than kSettledChange, it is the last; from estimate to estimate it falls to
+/// half at most, and differences below kNear are none.
+constexpr double kSettledDecrease = 0.01, kSettledChange = 0.02, kNear = 0.01;
+/// What was learnt of a loss's curvature serves another scale that is not further away.
+constexpr double kAlike = 0.2;
 constexpr double kOneStep = std::numeric_limits<double>::infinity();
+/// A scale that at the end is further than this from what the residuals there ask for was frozen
+/// too early: it moves on, but so often only.
+constexpr double kStale = 0.05;
+constexpr int kMostReturns = 5;
 /// No camera measures better: keeps the scale of perfect data above 0.
 constexpr double kLeastSigma_px = 1e-6;
 /// The median of |x| for a standard normal x is 1 / 1.4826.
@@ -25,7 +32,7 @@ constexpr double kSigmaPerMedian = 1.4826022185056018;
 /// Geman-McClure is convex where |r| < c / sqrt(3), Tukey's where |r| < c / sqrt(5), Cauchy's where
 /// |r| < c. The last hundredth may be anything.
 constexpr double kConvexQuantile = 0.99, kConvexScale = 3;
-/// What a graduated loss multiplies its scale by from round to round.
+/// What a scale is multiplied by from step to step, at least.
 constexpr double kAnneal = 0.5;
 
 double estimate_sigma(System& system) {
@@ -40,15 +47,19 @@ class Rounds {
 
   void run() {
     begin();
-    for (int estimates = 1; is_provisional(); estimates += !anneals_) {
-      descend(kOneStep);
-      if (!converged()) break;
-      const LossRound next = next_round();
-      if (is_automatic() && (is_near(next.scale_px) || estimates == kMostEstimates)) break;
-      summary_.rounds.push_back(next);
+    for (int returns = 0;; ++returns) {
+      while (provisional_) {
+        descend(kOneStep);
+        if (!converged()) return finish();
+        choose_next();
+      }
+      descend(options_.tolerance);
+      if (!converged() || !is_automatic() || returns == kMostReturns) return finish();
+      const LossRound there = target();
+      if (std::abs(there.scale_px - now().scale_px) <= kStale * now().scale_px) return finish();
+      provisional_ = true;
+      rescale(there);
     }
-    if (!is_provisional() || converged()) descend(options_.tolerance);
-    if (is_automatic()) summary_.final_sigma_px = estimate_sigma(system_);
   }
 
  private:
@@ -70,24 +81,40 @@ class Rounds {
 
   void begin() {
     summary_.rounds.push_back(target());
+    provisional_ = is_automatic();
     if (!options_.loss.graduated) return;
     const double convex = kConvexScale * system_.residual_scale(kConvexQuantile);
-    anneals_ = convex > now().scale_px;
+    provisional_ = provisional_ || convex > now().scale_px;
     now().scale_px = std::max(convex, now().scale_px);
   }
 
-  LossRound next_round() {
+  /// After a step with a provisional scale: the next one, and whether it is the last.
+  void choose_next() {
     LossRound next = target();
-    anneals_ = options_.loss.graduated && next.scale_px < now().scale_px * kAnneal;
-    if (anneals_) next.scale_px = now().scale_px * kAnneal;
-    return next;
+    const double wanted = next.scale_px;
+    next.scale_px = std::max(wanted, now().scale_px * kAnneal);
+    const bool narrows = options_.loss.graduated && next.scale_px > wanted;
+    const double change = std::abs(next.scale_px - now().scale_px) / now().scale_px;
+    provisional_ = narrows || (is_automatic() &&
+                               (last_decrease() >= kSettledDecrease || change >= kSettledChange));
+    if (change > (is_automatic() ? kNear : 0)) return rescale(next);
+    if (history_) history_->small_decreases = 0;  // with one step, any decrease was small
   }
 
-  /// Whether another scale may follow this one.
-  bool is_provisional() const { return anneals_ || is_automatic(); }
+  void rescale(const LossRound& next) {
+    const double change = std::abs(next.scale_px - now().scale_px) / now().scale_px;
+    summary_.rounds.push_back(next);
+    if (history_) history_->rescale(change <= kAlike);
+  }
 
-  bool is_near(double scale_px) {
-    return std::abs(scale_px - now().scale_px) <= kSettled * now().scale_px;
+  /// Relative, of the cost by the last step that was taken with the present scale; 0: none was.
+  double last_decrease() const {
+    const Iteration& last = summary_.iterations.back();
+    return last.accepted && last.index > 0 ? (last.start_cost - last.cost) / last.start_cost : 0;
+  }
+
+  void finish() {
+    if (is_automatic()) summary_.final_sigma_px = estimate_sigma(system_);
   }
 
   bool converged() const {
@@ -101,8 +128,8 @@ class Rounds {
     SolveOptions options = options_;
     options.tolerance = tolerance;
     const std::size_t before = summary_.iterations.size();
-    if (before > 1) options.initial_damping = summary_.iterations.back().damping;
-    minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_, summary_);
+    minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_, summary_,
+             std::numeric_limits<double>::infinity(), &history_);
     const std::size_t after = summary_.iterations.size();
     if (now().steps == 0)
       now().initial_cost =
@@ -115,7 +142,8 @@ class Rounds {
   const SolveOptions& options_;
   const Stopwatch& since_start_;
   Summary& summary_;
-  bool anneals_ = false;  ///< the round's scale is wider than wanted: a graduated loss on its way
+  bool provisional_ = false;  ///< the scale is still on its way
+  std::optional<LoopHistory> history_;
 };
 
 }  // namespace

@@ -146,10 +146,12 @@ std::uint64_t system_bytes(const Counts& c, const PhotometricOptions& options, b
   };
   add((stored ? kRowBatch : patch_factors(options.affine_brightness)) * c.work.batches, 2);
   if (options.affine_brightness) add(kBrightnessBatch * c.work.batches, 2);
-  add(16 * c.work.batches, 2);                                        // where patches are
-  if (options.leaving != Leaving::free) add(16 * c.work.batches, 2);  // what leaving costs
-  add(kPointGroup * c.work.groups);                                   // rays
-  add(16 * c.work.batches);                                           // what batches hold
+  add(16 * c.work.batches, 2);                                     // where patches are
+  add(16 * c.work.batches, 2);                                     // what patches cost
+  if (options.leaving != Leaving::free) add(16 * c.work.batches);  // what leaving costs
+  add(kPointGroup * c.work.groups);                                // rays
+  add(8 * c.work.groups);                                          // points' own damping
+  add(16 * c.work.batches);                                        // what batches hold
   add(4 * c.work.batches);
   add(kTileDoubles * c.image_tiles);
   return bytes + 24 * c.sights;  // the list that these are arranged from

@@ -37,7 +37,8 @@ class Loop {
         summary_(summary),
         settled_motion_px_(settled_motion_px),
         control_(options.trust_region,
-                 options.initial_damping > 0 ? options.initial_damping : default_damping(1)) {}
+                 options.initial_damping > 0 ? options.initial_damping : default_damping(1),
+                 loss.kind != LossKind::none) {}
 
   /// Goes on from what is there, and leaves what there is after each step.
   void keep(std::optional<LoopHistory>* history) {
@@ -48,15 +49,18 @@ class Loop {
     forcing_ = from.forcing;
     precise_ = from.precise;
     small_decreases_ = from.small_decreases;
+    last_decrease_ = from.last_decrease;
     cost_ = from.cost;
     plain_cost_ = from.plain_cost;
-    begun_ = true;
+    begun_ = from.costs_known;
   }
 
   void run() {
     while (!done_) {
-      const Step step = system_.propose({control_.damping(), forcing_, loss_, &cancelled_, precise_,
-                                         control_.dogleg(), control_.radius()});
+      loss_.floor = control_.curvature_floor();
+      const Step step =
+          system_.propose({control_.damping(), forcing_, loss_, last_decrease_, &cancelled_,
+                           precise_, control_.dogleg(), control_.radius()});
       if (!begun_) begin(step);
       if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
       if (!step.solved && out_of_time()) break;
@@ -90,6 +94,8 @@ class Loop {
     start.cost = start.trial_cost = start.start_cost = cost_;
     start.damping = control_.damping();
     start.radius = control_.radius();
+    start.loss_floor = loss_.floor;
+    start.scale_px = loss_.kind == LossKind::none ? 0 : loss_.scale_px;
     start.gradient_max = step.gradient_max;
     if (!std::isfinite(cost_)) {
       end(Termination::no_usable_step,
@@ -110,6 +116,8 @@ class Loop {
     it.gradient_max = step.gradient_max;
     it.linear_iterations = step.linear_iterations;
     it.radius = control_.radius();
+    it.loss_floor = loss_.floor;
+    it.scale_px = loss_.kind == LossKind::none ? 0 : loss_.scale_px;
     it.reused = step.reused;
     if (trial) {
       it.gain_ratio = (cost_ - trial->cost) / trial->predicted_decrease;
@@ -126,7 +134,7 @@ class Loop {
 
   void accept(const Trial& trial, Iteration it) {
     system_.accept();
-    const double decrease = (cost_ - trial.cost) / cost_;
+    const double decrease = last_decrease_ = (cost_ - trial.cost) / cost_;
     cost_ = it.cost = trial.cost;
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
@@ -195,7 +203,8 @@ class Loop {
     it.time_s = since_begin_.seconds();
     summary_.iterations.push_back(it);
     if (history_ != nullptr)
-      *history_ = {control_.state(), cost_, plain_cost_, forcing_, precise_, small_decreases_};
+      *history_ = {control_.state(), true,          cost_, plain_cost_, forcing_, precise_,
+                   small_decreases_, last_decrease_};
     if (options_.on_iteration && !options_.on_iteration(it))
       end(Termination::stopped, "stopped by the caller; the best state so far is kept");
   }
@@ -208,7 +217,7 @@ class Loop {
   }
 
   System& system_;
-  const ScaledLoss loss_;
+  ScaledLoss loss_;
   const SolveOptions& options_;
   const Stopwatch& since_start_;
   const Stopwatch since_begin_;
@@ -223,6 +232,7 @@ class Loop {
   /// Float inside the linear solver resolves what is left of the cost no longer.
   bool precise_ = false;
   int small_decreases_ = 0;
+  double last_decrease_ = 1;
   bool any_finite_trial_ = false;
   bool begun_ = false, done_ = false;
 };

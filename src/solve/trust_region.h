@@ -24,10 +24,20 @@ double default_damping(std::size_t images);
 /// What the loop itself keeps from step to step, and what the held state costs.
 struct LoopHistory {
   StepControl::State control;
+  bool costs_known = true;  ///< else the first step evaluates them
   double cost = 0, plain_cost = 0;
   double forcing = 0;
   bool precise = false;
   int small_decreases = 0;
+  double last_decrease = 1;  ///< relative, of the cost
+
+  /// The loss has another scale: other costs, and unless it is much alike another curvature.
+  void rescale(bool alike) {
+    if (!alike) control.floor = {};
+    control.raise = false;
+    costs_known = false;
+    small_decreases = 0;
+  }
 };
 
 /// Levenberg-Marquardt or a dogleg, with gain-ratio control, on any System, with one loss. Adds to

@@ -99,7 +99,7 @@ void FloatBalOperator::apply(const double* x, double* y) {
                              state_.factors->data(),
                              {origin_[0], origin_[1], origin_[2]},
                              scale_,
-                             state_.weights->data()};
+                             state_.metric->data()};
   sums_.run(
       [&](const Chunk& chunk, double* saved, double* sums) {
         kernels_.product_float(in, chunk, reinterpret_cast<float*>(saved), sums);

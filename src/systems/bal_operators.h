@@ -21,10 +21,10 @@ struct BalState {
   Buffer<double>* cameras;
   const Buffer<double>* points;
   const Buffer<double>* factors;
-  const Buffer<double>* weights;  ///< of the loss; empty: none
+  const Buffer<double>* metric;  ///< of the loss; empty: none
 
   ProductInput input() const {
-    return {batches, cameras->data(), points->data(), factors->data(), weights->data()};
+    return {batches, cameras->data(), points->data(), factors->data(), metric->data()};
   }
   double* record(std::size_t image) const { return cameras->data() + kCameraRecord * image; }
 };

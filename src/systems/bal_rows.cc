@@ -29,7 +29,7 @@ void BalRows::attach(const SteppedState& state) {
 }
 
 BalState BalRows::held_state() {
-  return {&batches_, &chunks_, &held_, &state_->held.points, &state_->factors, &state_->weights};
+  return {&batches_, &chunks_, &held_, &state_->held.points, &state_->factors, &state_->metric};
 }
 
 void BalRows::write_records(const CameraState& cameras, Buffer<double>& records) const {
@@ -46,8 +46,9 @@ void BalRows::write_records(const CameraState& cameras, Buffer<double>& records)
 
 Records BalRows::eliminate(const Elimination& of, std::uint32_t c, double* scratch, double* tiles,
                            double* diagonal, EliminateOutput& out) {
-  const EliminateInput in{&batches_,  &chunks_,       held_.data(), state_->held.points.data(),
-                          of.damping, of.points_held, of.loss,      of.chart};
+  const EliminateInput in{&batches_,     &chunks_,       held_.data(), state_->held.points.data(),
+                          of.damping,    of.points_held, of.loss,      of.chart,
+                          of.own_damping};
   const Chunk& chunk = chunks_.chunks[c];
   const Records records = records_in(scratch, chunks_);
   kernels_.linearize(in, chunk, records, out);
@@ -79,9 +80,10 @@ void BalRows::trial(const PointTrial& of, std::uint32_t chunk, TrialOutput& out)
                       of.inner_iterations,
                       of.mean_square,
                       of.loss,
-                      state_->weights.data(),
+                      state_->metric.data(),
                       of.chart,
-                      of.blend};
+                      of.blend,
+                      of.own};
   kernels_.trial(in, chunks_.chunks[chunk], out);
 }
 

@@ -57,7 +57,10 @@ void add_state(const WorkCounts& c, Footprint& sum) {
   if (c.lenses) sum.add(lenses, 8 * kLensRecord, 2);
   sum.add(c.groups, 8 * kPointGroup, 2);
   sum.add(c.groups, 8 * kFactorGroup);
-  if (c.weighted) sum.add(c.batches, 64);
+  if (c.weighted) {
+    sum.add(c.batches, 8 * kMetricBatch);
+    sum.add(c.groups, 64);  // the points' own damping
+  }
   sum.add(c.columns, 8, 4);  // right-hand side, squares, damping, step
 }
 

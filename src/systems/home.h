@@ -11,6 +11,12 @@
 
 namespace sheaf {
 
+/// What one step leaves to the next beside the state.
+struct HomeHistory {
+  CameraStage::History stage;
+  std::vector<double> own_damping{};  ///< of points under a loss, 8 per group
+};
+
 /// A System whose state is a problem's: what the loop does not ask for, but those who built it do.
 class Home : public System {
  public:
@@ -18,10 +24,10 @@ class Home : public System {
   virtual const CameraState& cameras() const = 0;
   /// Writes the held points, 3 numbers for each; those that nothing sees are not touched.
   virtual void store_points(std::vector<double>& points) const = 0;
-  /// What one step leaves to the next beside the state: with both, and what the loop keeps
+  /// With it, the state and what the loop keeps
   /// (solve/trust_region.h), another home of the same problem and options goes on to the same bits.
-  virtual CameraStage::History history() const = 0;
-  virtual void restore(const CameraStage::History& history) = 0;
+  virtual HomeHistory history() const = 0;
+  virtual void restore(const HomeHistory& history) = 0;
   /// Observations behind their camera at the held state, or as many as there may be.
   virtual std::uint64_t count_behind() = 0;
   /// What it holds beside its arrangement.

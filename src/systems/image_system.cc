@@ -121,7 +121,7 @@ Costs ImageSystem::costs_of(const State& state) const {
 }
 
 Step ImageSystem::propose(const StepRequest& request) {
-  const bool same_loss = request.loss.kind == loss_.kind && request.loss.scale_px == loss_.scale_px;
+  const bool same_loss = request.loss == loss_;
   loss_ = request.loss;
   if (!linearized_ || !same_loss) linearize(held_);
   linearized_ = true;

@@ -31,8 +31,8 @@ class ImageSystem : public Home {
   Trial trial() override;
   void accept() override;
   double residual_scale(double quantile) override;
-  CameraStage::History history() const override { return stage_.history(); }
-  void restore(const CameraStage::History& history) override { stage_.restore(history); }
+  HomeHistory history() const override { return {stage_.history()}; }
+  void restore(const HomeHistory& history) override { stage_.restore(history.stage); }
   const CameraState& cameras() const override { return held_.cameras; }
   void store_points(std::vector<double>&) const override {}
   std::uint64_t count_behind() override;

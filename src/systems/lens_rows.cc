@@ -27,7 +27,7 @@ class LensRows::Operator : public StateOperator {
   void prepare(const double*) override {}
   void apply(const double* x, double* y) override {
     const SteppedState& state = *rows_.state_;
-    const LensProductInput in{rows_.held_input(), state.factors.data(), state.weights.data(), x};
+    const LensProductInput in{rows_.held_input(), state.factors.data(), state.metric.data(), x};
     sums_.run([&](const Chunk& chunk, double* saved,
                   double* sums) { rows_.lens_kernels_.product(in, chunk, saved, sums); },
               [&](std::size_t i, const double* total) {
@@ -58,7 +58,7 @@ class LensRows::RoundedOperator : public StateOperator {
     squares_ = squares;
     unit_ = scene_frame(rows_.state_->held.cameras).unit;
     const SteppedState& state = *rows_.state_;
-    const LensProductInput in{rows_.held_input(), state.factors.data(), state.weights.data()};
+    const LensProductInput in{rows_.held_input(), state.factors.data(), state.metric.data()};
     const std::vector<Chunk>& chunks = rows_.chunks_.chunks;
     rows_.threads_.for_each(chunks.size(), [&](std::size_t c) {
       rows_.lens_kernels_.keep(in, unit_, chunks[c], kept_.data());
@@ -125,7 +125,7 @@ class LensRows::Dogleg : public DoglegSource {
  private:
   LensProductInput input() const {
     const SteppedState& state = *rows_.state_;
-    return {rows_.held_input(), state.factors.data(), state.weights.data(), x_.data()};
+    return {rows_.held_input(), state.factors.data(), state.metric.data(), x_.data()};
   }
 
   const LensRows& rows_;
@@ -176,7 +176,8 @@ LensInput LensRows::held_input() const {
 
 Records LensRows::eliminate(const Elimination& of, std::uint32_t c, double* scratch, double* tiles,
                             double* diagonal, EliminateOutput& out) {
-  const LensEliminateInput in{held_input(), of.damping, of.points_held, of.loss, of.chart};
+  const LensEliminateInput in{held_input(), of.damping, of.points_held,
+                              of.loss,      of.chart,   of.own_damping};
   const LensChunks& lists = arranged_.lists;
   const Chunk& chunk = chunks_.chunks[c];
   const LensRecords records = layout_.in(scratch);
@@ -211,13 +212,14 @@ void LensRows::trial(const PointTrial& of, std::uint32_t chunk, TrialOutput& out
                           of.inner_iterations,
                           of.mean_square,
                           of.loss,
-                          state_->weights.data(),
+                          state_->metric.data(),
                           of.chart,
-                          of.blend};
+                          of.blend,
+                          of.own};
   lens_kernels_.trial(in, chunks_.chunks[chunk], out);
 }
 
-Costs LensRows::tried_costs(const PointTrial& in, const Costs& summed, Trial& out) {
+Costs LensRows::tried_costs(const PointTrial& in, const Costs& summed, Settling&, Trial& out) {
   if (in.watch_behind) out.newly_behind = count_newly_unseen();
   return summed;
 }

@@ -30,7 +30,8 @@ class LensRows : public PointRows {
                     double* diagonal, EliminateOutput& out) override;
   void step(const Buffer<double>& columns) override;
   void trial(const PointTrial& in, std::uint32_t chunk, TrialOutput& out) override;
-  Costs tried_costs(const PointTrial& in, const Costs& summed, Trial& out) override;
+  Costs tried_costs(const PointTrial& in, const Costs& summed, Settling& points,
+                    Trial& out) override;
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
   std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;

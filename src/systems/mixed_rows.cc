@@ -93,6 +93,8 @@ MixedRows::Totals MixedRows::gather(const State& state, std::uint32_t first, std
   Totals totals;
   for (std::uint32_t g = first; g < end; ++g) {
     const Batches::Group& group = batches_.groups[g];
+    double* const measured = state.measured_costs + 8 * std::size_t(g);
+    std::fill_n(measured, 8, 0.0);
     for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
       std::fill_n(rows + kRowBatch * b, kRowBatch, 0.0);
       for (int l = 0; l < static_cast<int>(group.lanes); ++l) {
@@ -104,6 +106,7 @@ MixedRows::Totals MixedRows::gather(const State& state, std::uint32_t first, std
         }
         const AnchorRow row = measure(state, g, b, l, anchor_.measurements[source - patch_pairs_]);
         totals.cost += row.cost;
+        measured[l] += row.cost;
         totals.square_sum += row.square;
         for (int r = 0; r < 2; ++r) {
           to[lanes_ * row_field::residual(r)] = row.residual[r];

@@ -26,6 +26,9 @@ class MixedRows {
 
   const Batches& batches() const { return batches_; }
 
+  /// 8 x group + lane of a point in the rows' arrangement.
+  std::uint64_t place_of(std::uint32_t point) const { return place_[point]; }
+
   /// Points in the arrangement of the rows to that of the patches.
   void spread_points(const Batches& patches, const double* points, double* patch_points) const;
 
@@ -33,6 +36,7 @@ class MixedRows {
     const double* views;       ///< kViewRecord per block
     const double* points;      ///< kPointGroup per group of the rows
     const double* patch_rows;  ///< `pairs` batches of rows for each of the patches
+    double* measured_costs;    ///< to be written: twice, of each point's measurements, 8 per group
   };
   struct Totals {
     double cost = 0, square_sum = 0;  ///< of the measurements, twice

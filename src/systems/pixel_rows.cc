@@ -111,7 +111,6 @@ PixelRows::PixelRows(const PatchScene& scene, const std::vector<Sight>& sights, 
   }
   if (!rules.leaving_is_free) {
     leaving_.allocate(16 * batches_.num_batches());
-    leaving_costs_.allocate(16 * batches_.num_batches());
   }
 }
 
@@ -124,9 +123,11 @@ void PixelRows::allocate(Half& half) const {
     const std::size_t pairs = rules_.exact_rows && scene_.warped ? kExactPairs : 1;
     half.patch_points.allocate(kPointGroup * batches_.groups.size());
     half.patch_rows.allocate(kRowBatch * pairs * batches_.num_batches());
+    half.measured_costs.allocate(8 * batches().groups.size());
   }
   half.brightness_sums.allocate(rules_.brightness ? kBrightnessBatch * batches_.num_batches() : 0);
   half.seen.allocate(16 * batches_.num_batches());
+  half.costs.allocate(16 * batches_.num_batches());
 }
 
 void PixelRows::attach(const SteppedState& state) {
@@ -143,9 +144,9 @@ void PixelRows::attach(const SteppedState& state) {
   blocks_.write_views(held.poses, brightness_of(held), held_.views.data());
 }
 
-PixelRows::Totals PixelRows::collapse(const PointState& state, Half& half, double* costs) {
+PixelRows::Totals PixelRows::collapse(const PointState& state, Half& half) {
   if (mixed_) mixed_->spread_points(batches_, state.points.data(), half.patch_points.data());
-  Totals totals = collapse_patches(state, half, costs);
+  Totals totals = collapse_patches(state, half);
   if (mixed_) gather_rows(state, half, totals);
   totals.cost += prior_cost(state.cameras);
   return totals;
@@ -176,13 +177,14 @@ KeptRows PixelRows::kept(const PhotometricInput& patches) const {
 }
 
 /// Chunks write what is theirs; their costs are added in order.
-PixelRows::Totals PixelRows::collapse_patches(const PointState& state, Half& half, double* costs) {
+PixelRows::Totals PixelRows::collapse_patches(const PointState& state, Half& half) {
   const bool exact = rules_.exact_rows && scene_.warped;
   const Chunks& chunks = patch_chunks();
   const PhotometricInput in = patches_at(state, half);
   std::vector<PhotometricOutput> outputs(
-      chunks.chunks.size(), {mixed_ ? half.patch_rows.data() : nullptr, half.factors.data(),
-                             half.brightness_sums.data(), half.seen.data(), costs, 0, 0, 0});
+      chunks.chunks.size(),
+      {mixed_ ? half.patch_rows.data() : nullptr, half.factors.data(), half.brightness_sums.data(),
+       half.seen.data(), half.costs.data(), 0, 0, 0});
   threads_.for_each(outputs.size(), [&](std::size_t c) {
     const Chunk& chunk = chunks.chunks[c];
     if (exact)
@@ -201,7 +203,8 @@ PixelRows::Totals PixelRows::collapse_patches(const PointState& state, Half& hal
 
 /// The patches' rows to where elimination takes them, and the measurements' rows and costs.
 void PixelRows::gather_rows(const PointState& at, Half& half, Totals& totals) const {
-  const MixedRows::State state{half.views.data(), at.points.data(), half.patch_rows.data()};
+  const MixedRows::State state{half.views.data(), at.points.data(), half.patch_rows.data(),
+                               half.measured_costs.data()};
   std::vector<MixedRows::Totals> measured(chunks_.chunks.size());
   threads_.for_each(measured.size(), [&](std::size_t c) {
     const Chunk& chunk = chunks_.chunks[c];
@@ -215,14 +218,20 @@ void PixelRows::gather_rows(const PointState& at, Half& half, Totals& totals) co
 
 /// Collapses the held state under this loss, unless that is what its rows are.
 void PixelRows::hold(const ScaledLoss& loss) {
-  if (collapsed_ && loss.kind == loss_.kind && loss.scale_px == loss_.scale_px) return;
+  if (collapsed_ && loss == loss_) return;
+  const bool same_costs = collapsed_ && loss.kind == loss_.kind && loss.scale_px == loss_.scale_px;
   loss_ = loss;
+  anchor_.loss.floor = loss.floor;
+  if (same_costs) {  // of the same patches: only what steps see of their curvature is new
+    totals_ = collapse(state_->held, held_);
+    return;
+  }
   leaving_.fill(0);
-  totals_ = collapse(state_->held, held_, leaving_costs_.data());
+  totals_ = collapse(state_->held, held_);
   collapsed_ = true;
   if (rules_.leaving_is_free) return;
   set_leaving();
-  if (totals_.left > 0) totals_ = collapse(state_->held, held_, nullptr);
+  if (totals_.left > 0) totals_ = collapse(state_->held, held_);
 }
 
 /// A patch that leaves costs as much as it does now, and no less than the mean does.
@@ -236,14 +245,13 @@ void PixelRows::set_leaving() {
   };
   for_each_patch([&](std::uint64_t at) {
     if (std::isnan(held_.seen[at])) return;
-    sum[0] += leaving_costs_[at], sum[1] += leaving_costs_[at + 8];
+    sum[0] += held_.costs[at], sum[1] += held_.costs[at + 8];
     ++count;
   });
   if (count == 0) return;
   for_each_patch([&](std::uint64_t at) {
     for (int k = 0; k < 2; ++k)
-      leaving_[at + 8 * k] =
-          std::max(leaving_costs_[at + 8 * k], sum[k] / static_cast<double>(count));
+      leaving_[at + 8 * k] = std::max(held_.costs[at + 8 * k], sum[k] / static_cast<double>(count));
   });
 }
 
@@ -292,8 +300,8 @@ double PixelRows::prior_cost(const CameraState& cameras) const {
 Records PixelRows::eliminate(const Elimination& of, std::uint32_t c, double* scratch, double* tiles,
                              double* diagonal, EliminateOutput& out) {
   const PhotometricInput patches = patches_at(state_->held, held_);
-  const StoredRowsInput in{&batches(), kept(patches), of.damping, of.points_held,
-                           !rules_.brightness};
+  const StoredRowsInput in{&batches(),     kept(patches),      of.damping,
+                           of.points_held, !rules_.brightness, of.own_damping};
   const Chunk& chunk = chunks_.chunks[c];
   const Records records = records_in(scratch, chunks_);
   row_kernels_.eliminate(in, chunk, records, out);
@@ -346,8 +354,9 @@ void PixelRows::trial(const PointTrial&, std::uint32_t chunk, TrialOutput& out) 
   row_kernels_.back_substitute(in, chunks_.chunks[chunk], out);
 }
 
-Costs PixelRows::tried_costs(const PointTrial&, const Costs&, Trial& out) {
-  tried_totals_ = collapse(state_->tried, tried_, nullptr);
+Costs PixelRows::tried_costs(const PointTrial& in, const Costs&, Settling& points, Trial& out) {
+  tried_totals_ = collapse(state_->tried, tried_);
+  if (points.own_damping != nullptr) settle(in.own.damping, points);
   out.motion_px = median_motion();
   return {tried_totals_.square_sum, tried_totals_.cost};
 }
@@ -477,12 +486,12 @@ std::unique_ptr<CameraSolver> PixelRows::make_implicit(const Columns& columns, b
 }
 
 std::uint64_t PixelRows::bytes() const {
-  std::uint64_t sum = rays_.bytes() + leaving_.bytes() + leaving_costs_.bytes() +
-                      image_tiles_.bytes() + image_diagonal_.bytes() + steps_.bytes();
+  std::uint64_t sum = rays_.bytes() + leaving_.bytes() + image_tiles_.bytes() +
+                      image_diagonal_.bytes() + steps_.bytes();
   for (const Half* half : {&held_, &tried_})
     sum += half->views.bytes() + half->brightness_sums.bytes() + half->seen.bytes() +
-           half->factors.bytes() + half->rows.bytes() + half->patch_points.bytes() +
-           half->patch_rows.bytes();
+           half->costs.bytes() + half->measured_costs.bytes() + half->factors.bytes() +
+           half->rows.bytes() + half->patch_points.bytes() + half->patch_rows.bytes();
   return sum;
 }
 

@@ -53,7 +53,7 @@ class PixelRows : public PointRows {
   std::size_t num_blocks() const override { return blocks_.count(); }
   const Chunks& reduced_chunks() const override { return image_chunks_; }
   std::size_t scratch() const override { return scratch_doubles(batches(), chunks_); }
-  bool keeps_weights() const override { return false; }
+  bool keeps_metric() const override { return false; }
   void attach(const SteppedState& state) override;
   const double* held_cameras() const override { return held_.views.data(); }
   void begin(const StepRequest& request) override { hold(request.loss); }
@@ -63,7 +63,8 @@ class PixelRows : public PointRows {
   ReducedSums finish(double* tiles, double* diagonal) override;
   void step(const Buffer<double>& columns) override;
   void trial(const PointTrial& in, std::uint32_t chunk, TrialOutput& out) override;
-  Costs tried_costs(const PointTrial& in, const Costs& summed, Trial& out) override;
+  Costs tried_costs(const PointTrial& in, const Costs& summed, Settling& points,
+                    Trial& out) override;
   void accepted() override;
   double residual_scale(double quantile) const override;
   std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
@@ -73,8 +74,10 @@ class PixelRows : public PointRows {
   class Operator;
   struct Half {  ///< all that belongs to one state: the held one or the one tried
     Buffer<double> views, brightness_sums, seen;
-    Buffer<double> factors;  ///< of the patches; or, where some points' rows are others:
-    Buffer<double> rows;     ///< as elimination takes them
+    Buffer<double> costs;           ///< of the patches (PhotometricOutput)
+    Buffer<double> measured_costs;  ///< twice, of each point's measured positions; where rows mix
+    Buffer<double> factors;         ///< of the patches; or, where some points' rows are others:
+    Buffer<double> rows;            ///< as elimination takes them
     Buffer<double> patch_points, patch_rows;  ///< in the patches' arrangement where that differs
   };
   struct Totals {
@@ -83,14 +86,15 @@ class PixelRows : public PointRows {
   };
 
   void allocate(Half& half) const;
-  /// costs: of the patches (PhotometricOutput), or nullptr.
-  Totals collapse(const PointState& state, Half& half, double* costs);
-  Totals collapse_patches(const PointState& state, Half& half, double* costs);
+  Totals collapse(const PointState& state, Half& half);
+  Totals collapse_patches(const PointState& state, Half& half);
   PhotometricInput patches_at(const PointState& state, const Half& half) const;
   KeptRows kept(const PhotometricInput& patches) const;
   void gather_rows(const PointState& state, Half& half, Totals& totals) const;
   void hold(const ScaledLoss& loss);
   void set_leaving();
+  bool send_back(const Chunk& chunk, double lambda, Settling& points) const;
+  void settle(double lambda, Settling& points);
   void add_brightness(const Chunk& chunk, double* diagonal) const;
   /// How the patches are arranged into chunks; batches() is how the rows are.
   const Chunks& patch_chunks() const { return mixed_ ? patch_chunks_ : chunks_; }
@@ -106,7 +110,7 @@ class PixelRows : public PointRows {
   void (*const pose_pairs_)(const Chunks&, const Chunk&, const Records&, double* tiles);
   const PhotometricKernels& patch_kernels_;
   Threads& threads_;
-  const Anchor anchor_;
+  Anchor anchor_;
   PatchBlocks blocks_;
   Batches batches_;                   ///< of the patches; what these call an image is a block
   std::unique_ptr<MixedRows> mixed_;  ///< null: every patch is one observation, and all there is
@@ -118,7 +122,7 @@ class PixelRows : public PointRows {
 
   Half held_, tried_;
   Buffer<double> rays_;
-  Buffer<double> leaving_, leaving_costs_;       ///< empty where leaving is free
+  Buffer<double> leaving_;                       ///< empty where leaving is free
   Buffer<double> image_tiles_, image_diagonal_;  ///< folded; empty where blocks are images
   std::vector<std::int64_t> tile_of_;            ///< of two images
   Buffer<double> image_steps_, steps_;           ///< kBlockVector per image, per block

@@ -48,7 +48,7 @@ struct WorkCounts {
   std::uint64_t pair_runs = 0;  ///< runs of pairs of one tile in a chunk, about
   bool lens_shared = false;
   bool images_couple = true;         ///< some free point or shared lens couples images
-  bool weighted = false;             ///< a loss leaves a weight for each observation
+  bool weighted = false;             ///< a loss leaves a metric for each observation
   bool dogleg = false;               ///< the gradient is summed by image, steps are blended
   bool only_formed = false;          ///< there is no implicit product
   std::optional<LensCounts> lenses;  ///< of any model: implicit products are dearer

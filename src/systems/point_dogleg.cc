@@ -10,8 +10,7 @@ namespace sheaf {
 
 bool PointSystem::only_radius_is_new(const StepRequest& request) const {
   return proposed_ && request.dogleg && request_.dogleg && request.damping == request_.damping &&
-         request.loss.kind == request_.loss.kind &&
-         request.loss.scale_px == request_.loss.scale_px && request.precise == request_.precise;
+         request.loss == request_.loss && request.precise == request_.precise;
 }
 
 /// Whether the radius cuts the Newton point off is known once it was tried; where it is to be
@@ -30,7 +29,7 @@ Trial PointSystem::trial() {
     step = (stage_.cut() ? best_in_plane : dogleg)(*plane_, request_.radius);
   }
   Trial out = newton && step.is_newton() ? *newton : try_step(step);
-  if (!step.is_newton()) out.predicted_decrease = decrease_of(*plane_, step);
+  if (!step.is_newton()) out.predicted_decrease = less_what_was_left(decrease_of(*plane_, step));
   out.length = length_of(*plane_, step);
   out.damping = damping_of(*plane_, step);
   return out;

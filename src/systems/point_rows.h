@@ -29,7 +29,10 @@ struct PointState {
 struct SteppedState {
   PointState held, tried;
   Buffer<double> factors;  ///< kFactorGroup per group, of the last elimination
-  Buffer<double> weights;  ///< rho' of the held state, 8 per batch; empty without a loss
+  Buffer<double> metric;   ///< of the held state, kMetricBatch per batch; empty without a loss
+  /// Of each point, 8 per group: what it damps itself by beside the common damping; empty without a
+  /// loss. It outlives accepted and rejected steps.
+  Buffer<double> own_damping;
 };
 
 /// How points are eliminated.
@@ -38,6 +41,7 @@ struct Elimination {
   bool points_held = false;
   ScaledLoss loss{};
   ChartRules chart{};
+  const double* own_damping = nullptr;  ///< of the points (SteppedState)
 };
 
 /// How points follow a step of the cameras.
@@ -48,6 +52,14 @@ struct PointTrial {
   ScaledLoss loss{};
   ChartRules chart{};
   PointBlend blend{};
+  OwnIterations own{};
+};
+
+/// What rows may do about points that a step has made worse.
+struct Settling {
+  double* tried;             ///< points of the tried state
+  double* own_damping;       ///< as SteppedState has it; nullptr: points have none
+  double left_decrease = 0;  ///< as TrialOutput
 };
 
 class DoglegSource;
@@ -67,8 +79,8 @@ class PointRows {
   virtual const Chunks& reduced_chunks() const { return chunks(); }
   /// Doubles of scratch that a thread needs to eliminate a chunk.
   virtual std::size_t scratch() const = 0;
-  /// Whether elimination leaves weights of the loss for later passes.
-  virtual bool keeps_weights() const { return true; }
+  /// Whether elimination leaves the loss's metric for later passes.
+  virtual bool keeps_metric() const { return true; }
 
   /// Takes the state, which must outlive the rows, and writes the records of the held one.
   virtual void attach(const SteppedState& state) = 0;
@@ -95,7 +107,9 @@ class PointRows {
   /// Back-substitutes the points of a chunk and adds the cost there.
   virtual void trial(const PointTrial& in, std::uint32_t chunk, TrialOutput& out) = 0;
   /// Once all chunks were tried; may replace the costs and add to `out`.
-  virtual Costs tried_costs(const PointTrial&, const Costs& summed, Trial&) { return summed; }
+  virtual Costs tried_costs(const PointTrial&, const Costs& summed, Settling&, Trial&) {
+    return summed;
+  }
   /// The tried state became the held one.
   virtual void accepted() = 0;
 

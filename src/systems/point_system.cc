@@ -108,9 +108,7 @@ Step PointSystem::propose(const StepRequest& request) {
 Step PointSystem::linearize(const StepRequest& request) {
   rows_->begin(request);
   loss_ = request.loss;
-  const bool weighted = loss_.kind != LossKind::none && rows_->keeps_weights();
-  const std::size_t weights = weighted ? 8 * rows_->batches().num_batches() : 0;
-  if (state_.weights.size() != weights) state_.weights.allocate(weights);
+  allocate_for_loss();
   chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
   std::vector<EliminateOutput> outputs(num_slices());
   eliminate(request, outputs);
@@ -120,11 +118,24 @@ Step PointSystem::linearize(const StepRequest& request) {
   return collect_step(request, outputs);
 }
 
+void PointSystem::allocate_for_loss() {
+  const bool robust = loss_.kind != LossKind::none;
+  const Batches& batches = rows_->batches();
+  const std::size_t metric =
+      robust && rows_->keeps_metric() ? kMetricBatch * batches.num_batches() : 0;
+  if (state_.metric.size() != metric) state_.metric.allocate(metric);
+  const std::size_t own = robust ? 8 * batches.groups.size() : 0;
+  if (state_.own_damping.size() == own) return;
+  state_.own_damping.allocate(own);
+  state_.own_damping.fill(0);
+}
+
 void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOutput>& outputs) {
   const Chunks& chunks = rows_->chunks();
   const std::size_t tile_doubles = kTileDoubles * chunks.tiles.size();
   const std::size_t diagonal_doubles = kDiagonalDoubles * rows_->num_blocks();
-  const Elimination in{request.damping, rules_.held, loss_, chart_};
+  const Elimination in{request.damping, rules_.held, loss_, chart_,
+                       state_.own_damping.size() > 0 ? state_.own_damping.data() : nullptr};
   CoarseSpace* const coarse = stage_.coarse();
   if (coarse != nullptr) coarse->begin(rows_->held_cameras(), request.damping);
   threads_.for_each(outputs.size(), [&](std::size_t s) {
@@ -135,7 +146,7 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
     std::fill_n(tiles, tile_doubles, 0.0);
     std::fill_n(diagonal, diagonal_doubles, 0.0);
     if (coarse != nullptr) coarse->clear(s);
-    outputs[s] = {state_.factors.data(), 0, 0, 0, 0, state_.weights.data()};
+    outputs[s] = {state_.factors.data(), 0, 0, 0, 0, state_.metric.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
       const Records records = rows_->eliminate(in, c, scratch.data(), tiles, diagonal, outputs[s]);
       if (coarse != nullptr) coarse->add(s, chunks.chunks[c], records);
@@ -175,7 +186,12 @@ PointTrial PointSystem::point_trial(const DoglegStep& step) const {
                  mean_square_,
                  loss_,
                  chart_,
+                 {},
                  {}};
+  out.own.damping = request_.damping;
+  out.own.worth = std::max(inner_iterations::kLeastWorth,
+                           std::min(inner_iterations::kWorthOne,
+                                    inner_iterations::kWorthOfLast * request_.last_decrease));
   if (plane_ && !rules_.held) {
     out.blend.newton = step.newton;
     out.blend.descent = step.descent * request_.damping;
@@ -194,14 +210,15 @@ Trial PointSystem::try_step(const DoglegStep& step) {
   const Chunks& chunks = rows_->chunks();
   std::vector<TrialOutput> outputs(num_slices());
   threads_.for_each(outputs.size(), [&](std::size_t s) {
-    outputs[s] = {state_.tried.points.data(), 0, 0, 0, 0};
+    outputs[s] = {state_.tried.points.data(), 0, 0, 0, 0, 0, 0, state_.own_damping.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c)
       rows_->trial(in, c, outputs[s]);
   });
   // The decrease goes on from the points' part of the elimination.
   double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
-  newton_damping_ = 0;
+  newton_damping_ = left_decrease_ = 0;
   for (const TrialOutput& o : outputs) {
+    left_decrease_ += o.left_decrease;
     square_sum += o.square_sum;
     loss_sum += o.loss_sum;
     decrease += o.damping_term;
@@ -209,10 +226,14 @@ Trial PointSystem::try_step(const DoglegStep& step) {
     step2 = std::max(step2, o.step2_max);
     out.newly_behind += o.newly_behind;
   }
-  const Costs costs = rows_->tried_costs(in, Costs::of(loss_, square_sum, loss_sum), out);
+  Settling settling{state_.tried.points.data(),
+                    state_.own_damping.size() > 0 ? state_.own_damping.data() : nullptr,
+                    left_decrease_};
+  const Costs costs = rows_->tried_costs(in, Costs::of(loss_, square_sum, loss_sum), settling, out);
+  left_decrease_ = settling.left_decrease;
   out.plain_cost = costs.square / 2;
   out.cost = trial_cost_ = costs.robust / 2;
-  out.predicted_decrease = stage_.add_decrease(decrease) / 2;
+  out.predicted_decrease = less_what_was_left(stage_.add_decrease(decrease) / 2);
   out.step_norm = std::max(out.step_norm, std::sqrt(step2));
   return out;
 }
@@ -222,6 +243,23 @@ void PointSystem::accept() {
   std::swap(state_.held, state_.tried);
   rows_->accepted();
   proposed_ = false;
+}
+
+/// Points that did not follow their step brought nothing of what it promised.
+double PointSystem::less_what_was_left(double predicted) const {
+  if (left_decrease_ <= 0) return predicted;
+  return std::max(predicted - left_decrease_ / 2, 1e-3 * predicted);
+}
+
+HomeHistory PointSystem::history() const {
+  const Buffer<double>& own = state_.own_damping;
+  return {stage_.history(), {own.data(), own.data() + own.size()}};
+}
+
+void PointSystem::restore(const HomeHistory& history) {
+  stage_.restore(history.stage);
+  state_.own_damping.allocate(history.own_damping.size());
+  std::copy(history.own_damping.begin(), history.own_damping.end(), state_.own_damping.data());
 }
 
 double PointSystem::residual_scale(double quantile) { return rows_->residual_scale(quantile); }
@@ -240,8 +278,8 @@ void PointSystem::store_points(std::vector<double>& points) const {
 
 std::uint64_t PointSystem::bytes() const {
   std::uint64_t sum = state_.held.points.bytes() + state_.tried.points.bytes() +
-                      state_.factors.bytes() + state_.weights.bytes() + tiles_.bytes() +
-                      diagonal_.bytes() + scratch_.size() * 8 * rows_->scratch();
+                      state_.factors.bytes() + state_.metric.bytes() + state_.own_damping.bytes() +
+                      tiles_.bytes() + diagonal_.bytes() + scratch_.size() * 8 * rows_->scratch();
   if (passes_) sum += passes_->bytes();
   return sum + rows_->bytes() + stage_.bytes();
 }

@@ -52,8 +52,8 @@ class PointSystem : public Home {
   Trial trial() override;
   void accept() override;
   double residual_scale(double quantile) override;
-  CameraStage::History history() const override { return stage_.history(); }
-  void restore(const CameraStage::History& history) override { stage_.restore(history); }
+  HomeHistory history() const override;
+  void restore(const HomeHistory& history) override;
   const CameraState& cameras() const override { return state_.held.cameras; }
   void store_points(std::vector<double>& points) const override;
   std::uint64_t count_behind() override { return rows_->count_behind(); }
@@ -65,11 +65,13 @@ class PointSystem : public Home {
   void set_solver(const Plan& plan, const Numbering& columns, const Kernels& kernels);
   void fill_points(const std::vector<double>& points);
   void place_charts();
+  void allocate_for_loss();
   Step linearize(const StepRequest& request);
   void eliminate(const StepRequest& request, std::vector<EliminateOutput>& outputs);
   Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
   bool only_radius_is_new(const StepRequest& request) const;
   Trial try_step(const DoglegStep& step);
+  double less_what_was_left(double predicted) const;
   PointTrial point_trial(const DoglegStep& step) const;
   const Buffer<double>& blend_cameras(const DoglegStep& step);
   DoglegPasses& passes();
@@ -91,7 +93,8 @@ class PointSystem : public Home {
   CameraStage stage_;
   ReducedSums sums_{};  ///< of the last elimination
   double mean_square_ = 0, point_decrease_ = 0, trial_cost_ = 0;
-  ScaledLoss loss_;  ///< of the last proposal
+  double left_decrease_ = 0;  ///< twice what points promised that did not follow the trial's step
+  ScaledLoss loss_;           ///< of the last proposal
 
   // What a smaller radius at the same state is served from.
   StepRequest request_;        ///< the last proposal

@@ -14,6 +14,8 @@ struct StepRequest {
   double damping = 0;    ///< lambda: J^T J + lambda diag(J^T J)
   double forcing = 0.1;  ///< how exactly an iterative solver solves (CameraSystem::forcing)
   ScaledLoss loss{};     ///< of the held state's cost, of the step and of its trial
+  /// Relative decrease of the cost by the last step: points settle as exactly as this is worth.
+  double last_decrease = 1;
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
   bool precise = false;  ///< solve in double, even where float would do for the way there
   /// Keep what a smaller radius at the same state needs, and the trial within the radius.

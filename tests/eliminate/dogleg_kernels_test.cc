@@ -52,12 +52,13 @@ class DoglegKernelsTest : public testing::Test {
     eliminate(loss);
   }
 
-  /// The factors and weights that all of them read.
+  /// The factors and the metric that all of them read.
   void eliminate(const ScaledLoss& loss) {
     factors_.allocate(kFactorGroup * batches_.groups.size());
-    weights_ = Buffer<double>(loss.kind == LossKind::none ? 0 : 8 * batches_.num_batches());
+    metric_ =
+        Buffer<double>(loss.kind == LossKind::none ? 0 : kMetricBatch * batches_.num_batches());
     Buffer<double> scratch(scratch_doubles(batches_, chunks_));
-    EliminateOutput out{factors_.data(), 0, 0, 0, 0, weights_.data()};
+    EliminateOutput out{factors_.data(), 0, 0, 0, 0, metric_.data()};
     const EliminateInput in{&batches_,    &chunks_, cameras_.data(), points_.data(), kDamping,
                             points_held_, loss};
     for (const Chunk& chunk : chunks_.chunks)
@@ -69,7 +70,7 @@ class DoglegKernelsTest : public testing::Test {
     out.gradient.allocate(kProductRecord * 9);
     out.gradient.fill(0);
     const CurvatureInput in{
-        {&batches_, cameras_.data(), points_.data(), factors_.data(), weights_.data()},
+        {&batches_, cameras_.data(), points_.data(), factors_.data(), metric_.data()},
         kDamping,
         points_held_};
     for (const Chunk& chunk : chunks_.chunks) {
@@ -83,12 +84,12 @@ class DoglegKernelsTest : public testing::Test {
   static constexpr double kDamping = 1e-3;
   Batches batches_;
   Chunks chunks_;
-  Buffer<double> cameras_, points_, factors_, weights_;
+  Buffer<double> cameras_, points_, factors_, metric_;
   bool points_held_ = false;
 };
 
 TEST_F(DoglegKernelsTest, EveryInstructionSetAgreesWithPlainLoops) {
-  for (const ScaledLoss& loss : {ScaledLoss{}, ScaledLoss{LossKind::huber, 0.5}})
+  for (const ScaledLoss& loss : {ScaledLoss{}, ScaledLoss{LossKind::huber, 0.5, 0.01}})
     for (bool points_held : {false, true}) {
       make(loss, points_held);
       const Outcome expected = run(reference_dogleg_kernels());

@@ -17,7 +17,8 @@ namespace {
 
 /// Everything that the kernels produce from one state.
 struct Outcome {
-  Buffer<double> tiles, diagonal, factors, trial_points, product, float_product, weights, residuals;
+  Buffer<double> tiles, diagonal, factors, trial_points, product, float_product, metric, residuals,
+      own_damping;
   EliminateOutput eliminated{};
   TrialOutput trial{};
   double square_sum = 0;
@@ -96,12 +97,18 @@ class KernelsTest : public ::testing::Test {
     out.factors.allocate(kFactorGroup * batches_.groups.size());
     out.factors.fill(0);
     out.trial_points.allocate(points_.size());
+    // Some points damp themselves.
+    out.own_damping.allocate(8 * batches_.groups.size());
+    for (std::size_t i = 0; i < out.own_damping.size(); ++i)
+      out.own_damping[i] = i % 5 == 0 ? own_damping_ : 0;
     Buffer<double> scratch(scratch_doubles(batches_, chunks_));
-    const EliminateInput in{&batches_, &chunks_,     cameras_.data(), points_.data(),
-                            1e-3,      points_held_, loss_,           chart_};
+    const EliminateInput in{
+        &batches_,      &chunks_, cameras_.data(),
+        points_.data(), 1e-3,     points_held_,
+        loss_,          chart_,   loss_.kind == LossKind::none ? nullptr : out.own_damping.data()};
     out.eliminated.factors = out.factors.data();
-    if (loss_.kind != LossKind::none) out.weights.allocate(8 * batches_.num_batches());
-    out.eliminated.weights = out.weights.data();
+    if (loss_.kind != LossKind::none) out.metric.allocate(kMetricBatch * batches_.num_batches());
+    out.eliminated.metric = out.metric.data();
     const Records records = records_in(scratch.data(), chunks_);
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.linearize(in, chunk, records, out.eliminated);
@@ -117,15 +124,17 @@ class KernelsTest : public ::testing::Test {
                            points_held_ ? 0 : inner_iterations_,
                            mean_square_,
                            loss_,
-                           out.weights.data(),
+                           out.metric.data(),
                            chart_,
-                           blend_};
+                           blend_,
+                           {1e-3, 1e-6}};
     out.trial.points = out.trial_points.data();
+    out.trial.own_damping = out.own_damping.data();
     out.product.allocate(kProductRecord * 9);
     out.product.fill(0);
     Buffer<double> saved(product_scratch_doubles(batches_));
     const ProductInput product{&batches_, cameras_.data(), points_.data(), out.factors.data(),
-                               out.weights.data()};
+                               out.metric.data()};
     out.residuals.allocate(16 * batches_.num_batches());
     out.float_product.allocate(out.product.size());
     out.float_product.fill(0);
@@ -137,7 +146,7 @@ class KernelsTest : public ::testing::Test {
                                    out.factors.data(),
                                    {origin[0], origin[1], origin[2]},
                                    0.125,
-                                   out.weights.data()};
+                                   out.metric.data()};
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.product_float(single, chunk, reinterpret_cast<float*>(saved.data()),
                             out.float_product.data());
@@ -160,7 +169,8 @@ class KernelsTest : public ::testing::Test {
   bool points_held_ = false;
   int inner_iterations_ = 3;
   PointBlend blend_;
-  double mean_square_ = 1;  ///< px^2: every point has something to gain
+  double own_damping_ = 0.05;  ///< of some points under a loss
+  double mean_square_ = 1;     ///< px^2: every point has something to gain
   ScaledLoss loss_;
   ChartRules chart_;
 };
@@ -194,8 +204,10 @@ void expect_close_by_column(const Buffer<double>& a, const Buffer<double>& b, do
 void clear_padding(const Batches& batches, Outcome& o) {
   for (std::size_t g = 0; g < batches.groups.size(); ++g)
     for (std::uint32_t l = batches.groups[g].lanes; l < 8; ++l) {
-      for (std::uint32_t k = 0; k < batches.groups[g].track && o.weights.size() > 0; ++k)
-        o.weights[8 * (batches.groups[g].first_batch + k) + l] = 0;
+      for (std::uint32_t k = 0; k < batches.groups[g].track && o.metric.size() > 0; ++k)
+        for (std::size_t i = 0; i < 3; ++i)
+          o.metric[kMetricBatch * (batches.groups[g].first_batch + k) + 8 * i + l] = 0;
+      o.own_damping[8 * g + l] = 0;
       for (int k = 0; k < 12; ++k) o.factors[kFactorGroup * g + 8 * k + l] = 0;
       for (int k = 0; k < 3; ++k) o.trial_points[kPointGroup * g + 8 * k + l] = 0;
     }
@@ -214,7 +226,9 @@ void KernelsTest::expect_agreement(double slack, double loose) {
     const auto near = [=](double a, double b) {
       EXPECT_NEAR(a, b, slack * loose * 1e-10 * std::abs(b));
     };
-    expect_close(got.weights, expected.weights, 1e-9, "weight");
+    expect_close(got.metric, expected.metric, 1e-9, "metric");
+    expect_close(got.own_damping, expected.own_damping, 1e-12, "own damping");
+    near(got.trial.left_decrease, expected.trial.left_decrease);
     expect_close(got.residuals, expected.residuals, 1e-9, "residual");
     near(got.eliminated.loss_sum, expected.eliminated.loss_sum);
     near(got.trial.loss_sum, expected.trial.loss_sum);
@@ -246,9 +260,12 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceWithALoss) {
     for (LossKind kind : kLosses) {
       SCOPED_TRACE(to_string(kind));
       make(lists == ChunkLists::diagonal, lists);
-      loss_ = {kind, kind == LossKind::tukey ? 40.0 : 5.0};
-      // Points whose weights are small are loose: inner iterations move them by rounding.
-      expect_agreement(1000);
+      for (double floor : {1.0, 0.1, 1e-3}) {
+        SCOPED_TRACE(floor);
+        loss_ = {kind, kind == LossKind::tukey ? 40.0 : 5.0, floor};
+        // Points whose weights are small are loose: inner iterations move them by rounding.
+        expect_agreement(1000);
+      }
     }
 }
 
@@ -297,6 +314,7 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceInChartsOfFarPoints) {
 }
 
 TEST_F(KernelsTest, AWideLossIsNone) {
+  own_damping_ = 0;
   make(false, ChunkLists::pairs);
   const Outcome plain = run(*available_kernels().front());
   for (LossKind kind : kLosses) {

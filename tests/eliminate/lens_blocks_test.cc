@@ -38,7 +38,7 @@ class Linearized {
     const LensChunks chunks = cut_lens_chunks(batches, tracks, lists, alone);
     const LensScratch layout(batches, tracks, chunks.chunks, chunks.tiles);
     Buffer<double> scratch(layout.doubles), factors(kFactorGroup * batches.groups.size());
-    Buffer<double> weights(8 * batches.num_batches()),
+    Buffer<double> metric(kMetricBatch * batches.num_batches()),
         diagonal(kDiagonalDoubles * tracks.num_blocks);
     Buffer<double> tiles(kTileDoubles * std::max<std::size_t>(1, chunks.chunks.tiles.size()));
     // What was in the scratch before must not matter.
@@ -48,7 +48,7 @@ class Linearized {
     read_state(problem, batches);
     const LensEliminateInput in{
         {&batches, &tracks, {images_.data(), lenses_.data(), points_.data()}}, 1e-3, false, loss};
-    EliminateOutput out{factors.data(), 0, 0, 0, 0, weights.data()};
+    EliminateOutput out{factors.data(), 0, 0, 0, 0, metric.data()};
     for (const Chunk& chunk : chunks.chunks.chunks) {
       lens_kernels(kernels.name).linearize(in, chunk, records, out);
       lens_kernels(kernels.name)
@@ -109,7 +109,7 @@ Problem few_lenses(std::size_t lenses) {
 
 TEST(LensBlocks, AreTheSameSummedAtOnceAndFromRecords) {
   for (std::size_t lenses : {1, 4})
-    for (const ScaledLoss& loss : {ScaledLoss{}, ScaledLoss{LossKind::cauchy, 0.5}})
+    for (const ScaledLoss& loss : {ScaledLoss{}, ScaledLoss{LossKind::cauchy, 0.5, 0.01}})
       for (const Kernels* kernels : available_kernels()) {
         SCOPED_TRACE(std::string(kernels->name) + ", lenses: " + std::to_string(lenses));
         const Problem problem = few_lenses(lenses);

@@ -19,7 +19,7 @@ namespace {
 struct Moment {
   Problem problem;
   std::optional<LoopHistory> loop;
-  CameraStage::History home;
+  HomeHistory home;
 };
 
 /// So many steps, from a moment or from the start; `keep`: what there is after the given step.

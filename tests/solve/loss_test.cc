@@ -125,14 +125,40 @@ TEST(SolveWithLoss, AutomaticScaleSettles) {
     const Summary s = solve(problem, options);
     expect_rounds_fall(s);
     EXPECT_GE(s.rounds.size(), 2u);
-    EXPECT_LE(s.rounds.size(), 5u);
-    for (const LossRound& round : s.rounds)
-      EXPECT_DOUBLE_EQ(round.scale_px, tuning_constant(kind) * round.sigma_px);
+    EXPECT_LE(s.rounds.size(), 10u);
+    for (std::size_t k = 0; k < s.rounds.size(); ++k) {
+      const double wanted = tuning_constant(kind) * s.rounds[k].sigma_px;
+      const double least = k == 0 ? 0 : s.rounds[k - 1].scale_px / 2;
+      EXPECT_DOUBLE_EQ(s.rounds[k].scale_px, std::max(wanted, least)) << k;
+    }
+    for (const Iteration& it : s.iterations)
+      EXPECT_EQ(it.scale_px, s.rounds[std::size_t(it.round)].scale_px);
+    EXPECT_DOUBLE_EQ(s.rounds.back().scale_px, tuning_constant(kind) * s.rounds.back().sigma_px);
     // Noise of 0.5 px, less what the fit takes up, and a little more for the outliers.
-    EXPECT_NEAR(s.final_sigma_px, s.rounds.back().sigma_px, 0.1 * s.final_sigma_px);
+    EXPECT_NEAR(s.final_sigma_px, s.rounds.back().sigma_px, 0.05 * s.final_sigma_px);
     EXPECT_GT(s.final_sigma_px, 0.35);
     EXPECT_LT(s.final_sigma_px, 0.7);
     EXPECT_GT(s.rounds.front().sigma_px, 2 * s.final_sigma_px) << "the start is far off";
+  }
+}
+
+/// The weight alone took some hundred steps for any of these (docs/math.md, section 12).
+TEST(SolveWithLoss, EndsInFewStepsWhereTheGradientIsZero) {
+  for (LossKind kind : {LossKind::huber, LossKind::soft_l1, LossKind::cauchy}) {
+    SCOPED_TRACE(to_string(kind));
+    Problem problem = with_outliers();
+    SolveOptions options;
+    options.loss = {kind, 0.7};
+    options.tolerance = 0;
+    const Summary s = solve(problem, options);
+    EXPECT_EQ(s.termination, Termination::step_converged) << s.words;
+    EXPECT_LE(s.iterations.size(), 31u);
+    EXPECT_LT(s.iterations.back().gradient_max, 1e-6 * s.iterations.front().gradient_max);
+    const auto least = std::min_element(
+        s.iterations.begin(), s.iterations.end(),
+        [](const Iteration& a, const Iteration& b) { return a.loss_floor < b.loss_floor; });
+    EXPECT_LT(least->loss_floor, 0.1) << "and the floor had its part in it";
+    for (const Iteration& it : s.iterations) EXPECT_GE(it.loss_floor, 1e-3);
   }
 }
 
@@ -231,7 +257,7 @@ TEST_P(RealOutliers, HuberAndCauchyKeepThePosesAndThePlainLossDoesNot) {
   for (const Loss& loss : {Loss(Huber()), Loss(Cauchy())}) {
     const PoseErrors clean = errors_with(truth, loss, 0), dirty = errors_with(truth, loss, 0.1);
     EXPECT_LT(dirty.rotation, 2 * clean.rotation) << to_string(loss.kind);
-    EXPECT_LT(dirty.center, 2 * clean.center) << to_string(loss.kind);
+    EXPECT_LT(dirty.center, 2.2 * clean.center) << to_string(loss.kind);
   }
   const PoseErrors clean = errors_with(truth, {}, 0), dirty = errors_with(truth, {}, 0.1);
   EXPECT_GT(dirty.rotation, 5 * clean.rotation);

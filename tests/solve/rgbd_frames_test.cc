@@ -167,8 +167,8 @@ TEST_F(RgbdFrames, DisturbedPosesComeBack) {
   }
 }
 
-TEST_F(RgbdFrames, OneLevelIsNotEnough) {
-  PhotometricFolder folder = read(two_centimetres_one_degree(1));
+TEST_F(RgbdFrames, FromFourTimesAsFarOneLevelIsNotEnough) {
+  PhotometricFolder folder = read({4 * 0.0174532925, 0.08, 1});
   const std::vector<Pose> stated = folder.given_poses;
   refining_.levels = 1;
   refine_photometric(folder.problem, refining_).value();
