@@ -31,12 +31,13 @@ struct EliminateInput {
 constexpr double kDiagonalFloor = 1e-6, kDiagonalCeiling = 1e32;
 
 struct EliminateOutput {
-  double* factors;           ///< kFactorGroup per group
-  double square_sum;         ///< sum |r|^2
-  double point_decrease;     ///< sum |w|^2
-  double gradient_max2;      ///< largest |w|^2 of a point
-  double loss_sum = 0;       ///< sum rho(|r|^2); not summed without a loss
-  double* metric = nullptr;  ///< kMetricBatch per batch; not written without a loss
+  double* factors;                ///< kFactorGroup per group
+  double square_sum;              ///< sum |r|^2
+  double point_decrease;          ///< sum |w|^2
+  double gradient_max2;           ///< largest |w|^2 of a point
+  double loss_sum = 0;            ///< sum rho(|r|^2); not summed without a loss
+  double* metric = nullptr;       ///< kMetricBatch per batch; not written without a loss
+  double* point_costs = nullptr;  ///< sum rho of each point, 8 per group; likewise
 };
 
 /// Once the cameras have stepped and the points followed by back-substitution, each point takes
@@ -46,11 +47,12 @@ struct EliminateOutput {
 /// A step that does not lower the point's own cost is not taken. Decreases are of sum |r|^2 (or rho
 /// of it), as the point's own linear model predicts them, in mean_square by observation of the
 /// point.
-/// With a loss these are a Levenberg-Marquardt of its own: from the cheaper of where the step leads
-/// and where the point was, steps by the loss's metric, by the weight alone where such a step
-/// fails, and with ten times the damping where that fails too; each may take kTries tries for one
-/// of `inner_iterations`. A point that the step made worse than where it was damps itself by more
-/// in the elimination to come, and by less again after each step that served it.
+/// With a loss these are a Levenberg-Marquardt of its own: from where the step leads or, should
+/// that have made the point worse than it was, from the cheaper of this and where it was, steps by
+/// the loss's metric, by the weight alone where such a step fails, and with ten times the damping
+/// where that fails too; each may take kTries tries for one of `inner_iterations`. A point that the
+/// step made worse than where it was damps itself by more in the elimination to come, and by less
+/// again after each step that served it.
 namespace inner_iterations {
 constexpr double kWorthOne = 1e-4;  ///< smaller decreases are left to the next iteration
 constexpr double kWorthMore = 0.1;  ///< after a larger one, another step is looked at
@@ -77,7 +79,9 @@ inline double next_own_damping(bool fell, double lambda, double own) {
 
 /// What a point's own iterations go by under a loss.
 struct OwnIterations {
-  double damping = 0;                          ///< lambda of the step
+  const double* held_costs =
+      nullptr;         ///< of the points at the held state, as elimination left them
+  double damping = 0;  ///< lambda of the step
   double worth = inner_iterations::kWorthOne;  ///< smaller decreases are left
 };
 

@@ -82,12 +82,17 @@ struct OwnSteps {
     return robust_pass<Source, kLinearize>(in, of, X, kCharted ? &chart : nullptr, sums);
   }
 
-  /// From the cheaper of where the step leads and `stay`; returns where that is `stay`.
-  HWY_INLINE hn::Mask<D> begin(V mask, const V* stay, Refined& best) {
-    const TrackCost there = pass<false>(stay, p);
+  /// From where the step leads, or from `stay` where that is cheaper and the step made it worse
+  /// than it was; returns where that is so.
+  HWY_INLINE hn::Mask<D> begin(V mask, const V* stay, V worth, Refined& best) {
     best.at = pass<true>(best.X, p);
+    const V held = load(in.how.own.held_costs + 8 * of.group + of.lane());
+    const auto worse = hn::AndNot(hn::Le(best.at.cost, hn::Add(held, worth)), hn::Gt(mask, zero()));
+    if (hn::AllFalse(D(), worse)) return worse;
+    RobustSums unused;
+    const TrackCost there = pass<false>(stay, unused);
     // What is not finite is not less.
-    const auto fell = hn::AndNot(hn::Le(best.at.cost, there.cost), hn::Gt(mask, zero()));
+    const auto fell = hn::AndNot(hn::Le(best.at.cost, there.cost), worse);
     if (hn::AllFalse(D(), fell)) return fell;
     for (int i = 0; i < 3; ++i) best.X[i] = hn::IfThenElse(fell, stay[i], best.X[i]);
     best.at = pass<true>(best.X, p);
@@ -120,8 +125,7 @@ struct OwnSteps {
   }
 
   /// `damping`: each point's own to begin with.
-  HWY_INLINE void settle(V mask, V damping, Refined& best) {
-    const V worth = set(in.how.own.worth * in.how.mean_square * of.track);
+  HWY_INLINE void settle(V mask, V damping, V worth, Refined& best) {
     auto active = hn::Gt(mask, zero());
     auto metric = hn::Eq(zero(), zero());
     for (int left = inner_iterations::kTries * in.how.inner_iterations; left > 0; --left) {
@@ -155,7 +159,8 @@ template <class Source, bool kCharted>
 HWY_INLINE V settle_points(const TrialOf<typename Source::State>& in, const GroupPart& of, V mask,
                            const V* base, const V* stay, double* own_damping, Refined& best) {
   OwnSteps<Source, kCharted> steps{in, of, base, {}, {}};
-  const auto fell = steps.begin(mask, stay, best);
+  const V worth = set(in.how.own.worth * in.how.mean_square * of.track);
+  const auto fell = steps.begin(mask, stay, worth, best);
   double* const own_at = own_damping + 8 * of.group + of.lane();
   const V own = load(own_at), lambda = set(in.how.own.damping);
   const V more =
@@ -164,7 +169,8 @@ HWY_INLINE V settle_points(const TrialOf<typename Source::State>& in, const Grou
   less = hn::IfThenZeroElse(hn::Lt(less, lambda), less);
   const V next = hn::IfThenElse(fell, more, less);
   store(next, own_at);
-  steps.settle(mask, hn::Max(next, set(in.how.blend.inner_damping * in.how.own.damping)), best);
+  steps.settle(mask, hn::Max(next, set(in.how.blend.inner_damping * in.how.own.damping)), worth,
+               best);
   const double* pd = of.factor(in.factors);
   V left = zero();
   for (int i = 0; i < 3; ++i) {

@@ -38,7 +38,30 @@ struct EliminateSums {
   V square[kParts], loss[kParts], decrease[kParts], gradient2[kParts];
 };
 
-/// What a loss's metric takes from V by its weight alone: sum (Jp^T u) (Jp^T u)^T, upper triangle.
+/// diag of what a loss's metric takes from V by its weight alone, sum (Jp^T u) (Jp^T u)^T.
+struct MetricLessDiagonal {
+  V v[3];
+
+  HWY_INLINE void add(const LaneJacobian& j, const Metric& m, const LaneChart* chart) {
+    V a[3];
+    for (int i = 0; i < 3; ++i) a[i] = fma(m.u0, j.point[0][i], hn::Mul(m.u1, j.point[1][i]));
+    if (chart != nullptr) chart->transpose(a);
+    for (int i = 0; i < 3; ++i) v[i] = fma(a[i], a[i], v[i]);
+  }
+  /// The scaled gradient of points, squared: the largest |J_i^T r|^2 / |J_i|^2 of a column, J by
+  /// the weight alone. By the metric the same gradient would count up to 1 / delta as much.
+  HWY_INLINE V gradient2(const PointSums& p) const {
+    const V diagonal[3] = {p.v00, p.v11, p.v22};
+    V most = zero();
+    for (int i = 0; i < 3; ++i) {
+      const V norm2 = hn::Max(hn::Add(diagonal[i], v[i]), set(1e-300));
+      most = hn::Max(most, hn::Div(hn::Mul(p.g[i], p.g[i]), norm2));
+    }
+    return most;
+  }
+};
+
+/// What a loss's metric takes from V by its weight alone, upper triangle.
 struct MetricLess {
   V v[6];
 
@@ -74,23 +97,10 @@ HWY_INLINE void base_of(const ChartRules& rules, const typename Source::State& a
   load_base(rules, *at.batches, of.first_batch, of.lane(), Source::images(at), base);
 }
 
-/// The scaled gradient of points under a loss, squared: |L^-1 g|^2 by the weight alone, whose V is
-/// no less than g g^T / s. By the metric the same gradient would count up to 1 / delta as much.
-template <bool kCharted>
-HWY_INLINE V gradient_by_weight(const PassElimination& how, PointSums p, const MetricLess& less,
-                                const LaneChart& chart) {
-  less.add_to(p, set(1.0));
-  DampedFactor damped;
-  damped.compute<kCharted>(how, set(how.damping), p, chart);
-  V w[3];
-  forward(damped.f, p.g, w);
-  return fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
-}
-
 /// Factors the points of a part, whose normal equations are p by their chart's coordinates.
 template <bool kRobust, bool kCharted>
 HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
-                            [[maybe_unused]] const MetricLess& less,
+                            [[maybe_unused]] const MetricLessDiagonal& less,
                             [[maybe_unused]] const LaneChart& chart, const GroupPart& of,
                             double* factors, EliminateSums& sums, Factor& f, V* w) {
   DampedFactor damped;
@@ -103,7 +113,7 @@ HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
   const V w2 = fma(w[0], w[0], fma(w[1], w[1], hn::Mul(w[2], w[2])));
   sums.decrease[of.part] = hn::Add(sums.decrease[of.part], w2);
   V gradient2 = w2;
-  if constexpr (kRobust) gradient2 = gradient_by_weight<kCharted>(how, p, less, chart);
+  if constexpr (kRobust) gradient2 = less.gradient2(p);
   sums.gradient2[of.part] = hn::Max(sums.gradient2[of.part], gradient2);
   double* out = factors + kFactorGroup * of.group + of.lane();
   Factor x = f;
@@ -131,8 +141,8 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   }
   PointSums p;
   p.clear();
-  [[maybe_unused]] MetricLess less;
-  if constexpr (kRobust) less.clear();
+  [[maybe_unused]] MetricLessDiagonal less{{zero(), zero(), zero()}};
+  [[maybe_unused]] V cost = zero();
   V square = sums.square[of.part], robust = sums.loss[of.part];
   const double* rows = nullptr;
   double* const room = Source::room(to);
@@ -148,7 +158,7 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
       apply_loss(rows, j);
       if constexpr (Source::kMostBlocks > 0)
         source.apply_loss_to_others(rows, room + source.stride() * o);
-      robust = hn::Add(robust, rows.rho.value);
+      cost = hn::Add(cost, rows.rho.value);
       store_metric(metric, out.metric + kMetricBatch * b + of.lane());
     }
     if constexpr (kCharted)
@@ -157,6 +167,10 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
     rows = source.keep(j, o, room);
   }
   sums.square[of.part] = square;
+  if constexpr (kRobust) {
+    store(cost, out.point_costs + 8 * of.group + of.lane());
+    robust = hn::Add(robust, cost);
+  }
   sums.loss[of.part] = robust;
   Factor f;
   V w[3];

@@ -51,6 +51,7 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   const Vector3<double> X = point_of(in.points, g, lane);
   std::array<double, 9> A{}, less{};
   Vector3<double> gradient{};
+  double cost = 0;
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
@@ -58,7 +59,7 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
     if (in.loss.kind != LossKind::none) {
       const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
       add_less(metric, row.j.point.data(), less);
-      out.loss_sum += apply_loss(in.loss, row).value;
+      cost += apply_loss(in.loss, row).value;
       store_metric(metric, out.metric, b, lane);
     }
     for (int e = 0; e < 2; ++e)
@@ -67,9 +68,10 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
         for (int k = 0; k < 3; ++k) A[3 * i + k] += row.j.point[3 * e + i] * row.j.point[3 * e + k];
       }
   }
+  out.loss_sum += cost;
   const PointCoordinates at(in.chart, base_of(in.chart, *in.batches, group, lane, in.cameras), X);
   const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
-  const double gradient2 = gradient_by_weight(at, A, less, gradient, in.damping, in.points_held);
+  const double by_weight = gradient_by_weight(at, A, less, gradient);
   const Vector3<double> D = at.damping(A, gradient, lambda);
   at.damp(D, 1, A);
   Factor3 f = Factor3::of(A);
@@ -77,7 +79,8 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   const Vector3<double> w = f.forward(gradient.data());
   const double w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
   out.point_decrease += w2;
-  out.gradient_max2 = std::max(out.gradient_max2, gradient2);
+  out.gradient_max2 = std::max(out.gradient_max2, in.loss.kind == LossKind::none ? w2 : by_weight);
+  if (in.loss.kind != LossKind::none) out.point_costs[8 * g + lane] = cost;
   store_factor(f, w, D, out.factors + kFactorGroup * g + lane);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;

@@ -21,24 +21,27 @@ struct PointTrack {
   std::uint32_t lane;
   std::vector<LensRow> rows;
   Matrix3<double> less{};  ///< what the loss's metric takes from V by its weight alone
+  double cost = 0;         ///< sum rho, under a loss
 };
 
 PointTrack look_at_point(const LensEliminateInput& in, std::size_t g, std::uint32_t lane,
                          EliminateOutput& out) {
   const Batches::Group& group = in.of.batches->groups[g];
   const Vector3<double> X = point_of(in.of.at.points, g, lane);
-  PointTrack track{g, lane, {}, {}};
+  PointTrack track{g, lane, {}};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     LensRow row = lens_row(in.of, X, b, lane);
     out.square_sum += row.square();
     if (in.loss.kind != LossKind::none) {
       const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
       add_less(metric, row.point[0].data(), track.less);
-      out.loss_sum += apply_loss(in.loss, row).value;
+      track.cost += apply_loss(in.loss, row).value;
       store_metric(metric, out.metric, b, lane);
     }
     track.rows.push_back(row);
   }
+  if (in.loss.kind != LossKind::none) out.point_costs[8 * g + lane] = track.cost;
+  out.loss_sum += track.cost;
   return track;
 }
 
@@ -162,9 +165,10 @@ void eliminate_point(const LensEliminateInput& in, const Chunk& chunk, std::size
   const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
   const EliminatedPoint p(normal, at, lambda, in.points_held);
   out.point_decrease += p.decrease();
-  out.gradient_max2 =
-      std::max(out.gradient_max2,
-               gradient_by_weight(at, normal.V, track.less, normal.g, in.damping, in.points_held));
+  const double gradient2 = in.loss.kind == LossKind::none
+                               ? p.decrease()
+                               : gradient_by_weight(at, normal.V, track.less, normal.g);
+  out.gradient_max2 = std::max(out.gradient_max2, gradient2);
   p.store(out.factors + kFactorGroup * g + lane);
   std::vector<WhitenedRow> whitened;
   const std::uint64_t batch = in.of.batches->groups[g].first_batch - chunk.first_batch;

@@ -209,18 +209,17 @@ inline void add_less(const RowMetric& metric, const double* point, Matrix3<doubl
     for (std::size_t k = 0; k < 3; ++k) less[3 * i + k] += a[i] * a[k];
 }
 
-/// |L^-1 g|^2 by the weight of the loss alone, V + less = L L^T but for the damping.
+/// The largest |J_i^T r|^2 / |J_i|^2 of a point's column, J by the weight of the loss alone.
 inline double gradient_by_weight(const PointCoordinates& at, const Matrix3<double>& V,
-                                 const Matrix3<double>& less, const Vector3<double>& g,
-                                 double lambda, bool held) {
+                                 const Matrix3<double>& less, const Vector3<double>& g) {
   Matrix3<double> A = V;
   for (std::size_t i = 0; i < 9; ++i) A[i] += less[i];
-  const Vector3<double> D = at.damping(A, g, lambda);
-  at.damp(D, 1, A);
-  Factor3 f = Factor3::of(A);
-  f.held = held;
-  const Vector3<double> w = f.forward(g.data());
-  return w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+  const Vector3<double> norm2 = at.diagonal(A);
+  const Vector3<double> gradient = at.plain() ? g : at.chart.transpose(g);
+  double most = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    most = std::max(most, gradient[i] * gradient[i] / std::max(norm2[i], 1e-300));
+  return most;
 }
 
 /// The largest of the common damping and the point's own.

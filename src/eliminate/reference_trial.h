@@ -87,17 +87,19 @@ PointCost refine_point(const Of& of, const Batches::Group& group, std::uint32_t 
 }
 
 /// A point's own Levenberg-Marquardt under a loss (eliminate/kernels.h) from the cheaper of X and
-/// `stay`; returns the cost where it ends. own: its damping from step to step.
+/// `stay`; returns the cost where it ends. held: its cost before; own: its damping from step to
+/// step.
 template <class Of>
 PointCost settle_point(const Of& of, const Batches::Group& group, std::uint32_t lane,
                        const double* factor, const Vector3<double>& base,
-                       const Vector3<double>& stay, double& own, Vector3<double>& X,
+                       const Vector3<double>& stay, double held, double& own, Vector3<double>& X,
                        double& left_decrease) {
   using namespace inner_iterations;
   PointCost best = cost_at(of, group, X, lane);
+  const double worth = of.in.own.worth * of.in.mean_square * group.track;
   const PointCost there = cost_at(of, group, stay, lane);
   const double lambda = of.in.own.damping;
-  const bool fell = !(best.cost <= there.cost);
+  const bool fell = !(best.cost <= held + worth) && !(best.cost <= there.cost);
   own = next_own_damping(fell, lambda, own);
   if (fell) {
     X = stay, best = there;
@@ -117,7 +119,7 @@ PointCost settle_point(const Of& of, const Batches::Group& group, std::uint32_t 
     const Factor3 f = Factor3::of(A);
     const Vector3<double> w = f.forward(best.normal.g.data());
     const double decrease = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-    if (!(decrease > of.in.own.worth * of.in.mean_square * group.track)) break;
+    if (!(decrease > worth)) break;
     const Vector3<double> Y = at.step(f.backward(w), base);
     const PointCost tried = cost_at(of, group, Y, lane);
     const bool better = tried.cost < best.cost;
@@ -163,6 +165,7 @@ void try_point(const Of& of, std::size_t g, std::uint32_t lane, TrialOutput& out
   const bool settles = of.in.loss.kind != LossKind::none && of.in.inner_iterations > 0;
   const PointCost cost = settles
                              ? settle_point(of, group, lane, factor, moved, at.plain() ? X : stay,
+                                            of.in.own.held_costs[8 * g + lane],
                                             out.own_damping[8 * g + lane], Y, out.left_decrease)
                              : refine_point(of, group, lane, factor, moved, stay, Y);
   double d2 = 0, x2 = 1e-300;

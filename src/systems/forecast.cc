@@ -59,7 +59,7 @@ void add_state(const WorkCounts& c, Footprint& sum) {
   sum.add(c.groups, 8 * kFactorGroup);
   if (c.weighted) {
     sum.add(c.batches, 8 * kMetricBatch);
-    sum.add(c.groups, 64);  // the points' own damping
+    sum.add(c.groups, 64, 2);  // the points' own damping, what they cost
   }
   sum.add(c.columns, 8, 4);  // right-hand side, squares, damping, step
 }

@@ -33,6 +33,7 @@ struct SteppedState {
   /// Of each point, 8 per group: what it damps itself by beside the common damping; empty without a
   /// loss. It outlives accepted and rejected steps.
   Buffer<double> own_damping;
+  Buffer<double> point_costs;  ///< of the held state under a loss, 8 per group
 };
 
 /// How points are eliminated.

@@ -125,6 +125,8 @@ void PointSystem::allocate_for_loss() {
       robust && rows_->keeps_metric() ? kMetricBatch * batches.num_batches() : 0;
   if (state_.metric.size() != metric) state_.metric.allocate(metric);
   const std::size_t own = robust ? 8 * batches.groups.size() : 0;
+  const std::size_t costs = rows_->keeps_metric() ? own : 0;
+  if (state_.point_costs.size() != costs) state_.point_costs.allocate(costs);
   if (state_.own_damping.size() == own) return;
   state_.own_damping.allocate(own);
   state_.own_damping.fill(0);
@@ -146,7 +148,8 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
     std::fill_n(tiles, tile_doubles, 0.0);
     std::fill_n(diagonal, diagonal_doubles, 0.0);
     if (coarse != nullptr) coarse->clear(s);
-    outputs[s] = {state_.factors.data(), 0, 0, 0, 0, state_.metric.data()};
+    outputs[s] = {state_.factors.data(),    0, 0, 0, 0, state_.metric.data(),
+                  state_.point_costs.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
       const Records records = rows_->eliminate(in, c, scratch.data(), tiles, diagonal, outputs[s]);
       if (coarse != nullptr) coarse->add(s, chunks.chunks[c], records);
@@ -188,6 +191,7 @@ PointTrial PointSystem::point_trial(const DoglegStep& step) const {
                  chart_,
                  {},
                  {}};
+  out.own.held_costs = state_.point_costs.data();
   out.own.damping = request_.damping;
   out.own.worth = std::max(inner_iterations::kLeastWorth,
                            std::min(inner_iterations::kWorthOne,
@@ -278,8 +282,9 @@ void PointSystem::store_points(std::vector<double>& points) const {
 
 std::uint64_t PointSystem::bytes() const {
   std::uint64_t sum = state_.held.points.bytes() + state_.tried.points.bytes() +
-                      state_.factors.bytes() + state_.metric.bytes() + state_.own_damping.bytes() +
-                      tiles_.bytes() + diagonal_.bytes() + scratch_.size() * 8 * rows_->scratch();
+                      state_.factors.bytes() + state_.metric.bytes() + state_.point_costs.bytes() +
+                      state_.own_damping.bytes() + tiles_.bytes() + diagonal_.bytes() +
+                      scratch_.size() * 8 * rows_->scratch();
   if (passes_) sum += passes_->bytes();
   return sum + rows_->bytes() + stage_.bytes();
 }

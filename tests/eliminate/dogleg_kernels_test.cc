@@ -58,7 +58,8 @@ class DoglegKernelsTest : public testing::Test {
     metric_ =
         Buffer<double>(loss.kind == LossKind::none ? 0 : kMetricBatch * batches_.num_batches());
     Buffer<double> scratch(scratch_doubles(batches_, chunks_));
-    EliminateOutput out{factors_.data(), 0, 0, 0, 0, metric_.data()};
+    Buffer<double> costs(8 * batches_.groups.size());
+    EliminateOutput out{factors_.data(), 0, 0, 0, 0, metric_.data(), costs.data()};
     const EliminateInput in{&batches_,    &chunks_, cameras_.data(), points_.data(), kDamping,
                             points_held_, loss};
     for (const Chunk& chunk : chunks_.chunks)

@@ -18,7 +18,7 @@ namespace {
 /// Everything that the kernels produce from one state.
 struct Outcome {
   Buffer<double> tiles, diagonal, factors, trial_points, product, float_product, metric, residuals,
-      own_damping;
+      own_damping, point_costs;
   EliminateOutput eliminated{};
   TrialOutput trial{};
   double square_sum = 0;
@@ -109,6 +109,8 @@ class KernelsTest : public ::testing::Test {
     out.eliminated.factors = out.factors.data();
     if (loss_.kind != LossKind::none) out.metric.allocate(kMetricBatch * batches_.num_batches());
     out.eliminated.metric = out.metric.data();
+    out.point_costs.allocate(8 * batches_.groups.size());
+    out.eliminated.point_costs = out.point_costs.data();
     const Records records = records_in(scratch.data(), chunks_);
     for (const Chunk& chunk : chunks_.chunks) {
       kernels.linearize(in, chunk, records, out.eliminated);
@@ -127,7 +129,7 @@ class KernelsTest : public ::testing::Test {
                            out.metric.data(),
                            chart_,
                            blend_,
-                           {1e-3, 1e-6}};
+                           {out.point_costs.data(), 1e-3, 1e-6}};
     out.trial.points = out.trial_points.data();
     out.trial.own_damping = out.own_damping.data();
     out.product.allocate(kProductRecord * 9);

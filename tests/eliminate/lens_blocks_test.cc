@@ -41,6 +41,7 @@ class Linearized {
     Buffer<double> metric(kMetricBatch * batches.num_batches()),
         diagonal(kDiagonalDoubles * tracks.num_blocks);
     Buffer<double> tiles(kTileDoubles * std::max<std::size_t>(1, chunks.chunks.tiles.size()));
+    Buffer<double> costs(8 * batches.groups.size());
     // What was in the scratch before must not matter.
     scratch.fill(std::nan("")), diagonal.fill(0), tiles.fill(0);
     const LensRecords records = layout.in(scratch.data());
@@ -48,7 +49,7 @@ class Linearized {
     read_state(problem, batches);
     const LensEliminateInput in{
         {&batches, &tracks, {images_.data(), lenses_.data(), points_.data()}}, 1e-3, false, loss};
-    EliminateOutput out{factors.data(), 0, 0, 0, 0, metric.data()};
+    EliminateOutput out{factors.data(), 0, 0, 0, 0, metric.data(), costs.data()};
     for (const Chunk& chunk : chunks.chunks.chunks) {
       lens_kernels(kernels.name).linearize(in, chunk, records, out);
       lens_kernels(kernels.name)

@@ -50,7 +50,7 @@ struct Settings {
 /// Everything that the kernels produce from one state.
 struct Outcome {
   Buffer<double> tiles, diagonal, factors, metric, product, gradient, trial_points, residuals,
-      own_damping;
+      own_damping, point_costs;
   Buffer<float> kept;
   CurvatureOutput curvature{};
   double point_damping = 0;
@@ -195,6 +195,8 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
     of->fill(0);
   out.eliminated.factors = out.factors.data();
   out.eliminated.metric = out.metric.data();
+  out.point_costs.allocate(8 * batches.groups.size());
+  out.eliminated.point_costs = out.point_costs.data();
   out.trial.points = out.trial_points.data();
   out.own_damping.allocate(8 * batches.groups.size());
   for (std::size_t i = 0; i < out.own_damping.size(); ++i)
@@ -213,7 +215,7 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
                              out.metric.data(),
                              settings_.chart,
                              settings_.blend,
-                             {settings_.damping, 1e-6}};
+                             {out.point_costs.data(), settings_.damping, 1e-6}};
   for (const Chunk& chunk : chunks_.chunks.chunks) {
     kernels.trial(trial, chunk, out.trial);
     kernels.residuals(input(), chunk, &out.residuals[16 * chunk.first_batch]);

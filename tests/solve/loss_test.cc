@@ -149,7 +149,7 @@ TEST(SolveWithLoss, EndsInFewStepsWhereTheGradientIsZero) {
     Problem problem = with_outliers();
     SolveOptions options;
     options.loss = {kind, 0.7};
-    options.tolerance = 0;
+    options.tolerance = options.gradient_tolerance = 0;
     const Summary s = solve(problem, options);
     EXPECT_EQ(s.termination, Termination::step_converged) << s.words;
     EXPECT_LE(s.iterations.size(), 31u);
