@@ -54,11 +54,14 @@ struct Damping {
 /// less for a higher one. Constants as tried in docs/math.md, section 12.
 struct CurvatureFloor {
   static constexpr double kLeast = 1e-3, kDown = 0.3, kUp = 10;
-  static constexpr double kGenerous = 1.3, kPoor = 0.5;
+  static constexpr double kGenerous = 1.3, kPoor = 0.7;
+  /// A step that takes this much of the cost comes from afar: its gain says nothing of what is left.
+  static constexpr double kFar = 0.2;
   double delta = 1;
 
-  void accepted(double gain) {
-    if (gain > kGenerous)
+  /// decrease: relative, of the cost.
+  void accepted(double gain, double decrease) {
+    if (gain > kGenerous && decrease < kFar)
       delta = std::max(kLeast, delta * kDown);
     else if (gain < kPoor)
       delta = std::min(1.0, delta / kDown);
@@ -90,7 +93,7 @@ class StepControl {
   /// ScaledLoss::floor of the next step.
   double curvature_floor() const { return floor_.delta; }
 
-  void accepted(double gain, const Trial& trial, int linear_iterations) {
+  void accepted(double gain, const Trial& trial, int linear_iterations, double decrease = 0) {
     if (dogleg_) {
       const bool cut = trial.length >= radius_ * (1 - 1e-9);
       if (cut) damping_.lambda = std::max(damping_.lambda, trial.damping);
@@ -102,7 +105,7 @@ class StepControl {
     if (raise_)
       floor_.raise();
     else
-      floor_.accepted(gain);
+      floor_.accepted(gain, decrease);
     raise_ = false;
   }
   /// Without a trial there was no step: the system was not positive definite.

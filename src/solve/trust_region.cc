@@ -138,7 +138,7 @@ class Loop {
     cost_ = it.cost = trial.cost;
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
-    control_.accepted(it.gain_ratio, trial, it.linear_iterations);
+    control_.accepted(it.gain_ratio, trial, it.linear_iterations, decrease);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
     const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
@@ -152,7 +152,11 @@ class Loop {
   void reject(const Iteration& it, const std::optional<Trial>& trial) {
     const bool finite = std::isfinite(it.trial_cost);
     any_finite_trial_ = any_finite_trial_ || finite;
-    control_.rejected(trial);
+    // Conjugate gradients that found no positive definite matrix in floats go on in doubles first.
+    if (!trial && it.linear_iterations > 0 && !precise_)
+      precise_ = true;
+    else
+      control_.rejected(trial);
     publish(it);
     const bool exhausted = control_.exhausted();
     if (exhausted && !any_finite_trial_ && !moved())
