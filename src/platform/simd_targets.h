@@ -10,11 +10,9 @@
 // Else GCC from 12.3 on and clang would have EMU128 for a baseline, which is not among these.
 #define HWY_BROKEN_EMU128 1
 #if defined(SHEAF_FEW_INSTRUCTION_SETS)
-// Builds that look for races or for what input breaks: their kernels' lines are as good in one set.
+// Slow builds that look for one kind of error: the others run the same lines but for a few
+// shuffles.
 #define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_AVX2))
-#elif defined(__SANITIZE_ADDRESS__)
-// SSE4 runs the lines that AVX2 runs; without it this slow build is done a quarter sooner.
-#define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_AVX2 | HWY_AVX3))
 #else
 #define HWY_DISABLED_TARGETS (~(HWY_SCALAR | HWY_SSE4 | HWY_AVX2 | HWY_AVX3))
 #endif

@@ -55,7 +55,8 @@ struct Damping {
 struct CurvatureFloor {
   static constexpr double kLeast = 1e-3, kDown = 0.3, kUp = 10;
   static constexpr double kGenerous = 1.3, kPoor = 0.7;
-  /// A step that takes this much of the cost comes from afar: its gain says nothing of what is left.
+  /// A step that takes this much of the cost comes from afar: its gain says nothing of what is
+  /// left.
   static constexpr double kFar = 0.2;
   double delta = 1;
 

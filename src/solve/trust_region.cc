@@ -23,6 +23,8 @@ constexpr double kLoosestForcing = 0.2, kTightestForcing = 0.03;
 constexpr double kPreciseBelow = 1e-5;
 /// A gain below this is a step that did not help.
 constexpr double kSmallestGain = 1e-3;
+/// Tried on six scenes: 4 and 8 end sooner on some and later on others.
+constexpr double kLongest = 2;
 /// A step that changes no block by more than this (relative) is rounding.
 constexpr double kRounding = 1e-14;
 
@@ -50,6 +52,7 @@ class Loop {
     precise_ = from.precise;
     small_decreases_ = from.small_decreases;
     last_decrease_ = from.last_decrease;
+    stretch_ = from.stretch;
     cost_ = from.cost;
     plain_cost_ = from.plain_cost;
     begun_ = from.costs_known;
@@ -59,8 +62,8 @@ class Loop {
     while (!done_) {
       loss_.floor = control_.curvature_floor();
       const Step step =
-          system_.propose({control_.damping(), forcing_, loss_, last_decrease_, &cancelled_,
-                           precise_, control_.dogleg(), control_.radius()});
+          system_.propose({control_.damping(), forcing_, loss_, last_decrease_, stretch_,
+                           &cancelled_, precise_, control_.dogleg(), control_.radius()});
       if (!begun_) begin(step);
       if (done_ || gradient_vanished(step) || out_of_time() || out_of_iterations()) break;
       if (!step.solved && out_of_time()) break;
@@ -139,6 +142,7 @@ class Loop {
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
     control_.accepted(it.gain_ratio, trial, it.linear_iterations, decrease);
+    stretch_ = stretch_ > 1 ? 1 : stretch_after(it.gain_ratio);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
     const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
@@ -149,7 +153,22 @@ class Loop {
           "converged: the cost fell by less than the tolerance, relatively, twice in a row");
   }
 
+  /// Where a loss that forgets is concave the model lies too high however low its floor, and the
+  /// gain says by how much: of a mode with the curvature c, in the model C, gain - 1 = 1 - c / C is
+  /// left after a step. The next one is lengthened to 1 / (2 - gain) of itself, where that mode
+  /// ends, or to kLongest; the one after it is plain, for the modes that this overshoots.
+  double stretch_after(double gain) const {
+    if (control_.dogleg() || loss_.kind == LossKind::none || is_convex(loss_.kind)) return 1;
+    if (control_.curvature_floor() > CurvatureFloor::kLeast || gain < CurvatureFloor::kGenerous)
+      return 1;
+    return gain < 1.5 ? 1 / (2 - gain) : kLongest;
+  }
+
   void reject(const Iteration& it, const std::optional<Trial>& trial) {
+    if (stretch_ > 1) {  // the step itself was not tried
+      stretch_ = 1;
+      return publish(it);
+    }
     const bool finite = std::isfinite(it.trial_cost);
     any_finite_trial_ = any_finite_trial_ || finite;
     // Conjugate gradients that found no positive definite matrix in floats go on in doubles first.
@@ -207,8 +226,8 @@ class Loop {
     it.time_s = since_begin_.seconds();
     summary_.iterations.push_back(it);
     if (history_ != nullptr)
-      *history_ = {control_.state(), true,          cost_, plain_cost_, forcing_, precise_,
-                   small_decreases_, last_decrease_};
+      *history_ = {control_.state(), true,           cost_,   plain_cost_, forcing_, precise_,
+                   small_decreases_, last_decrease_, stretch_};
     if (options_.on_iteration && !options_.on_iteration(it))
       end(Termination::stopped, "stopped by the caller; the best state so far is kept");
   }
@@ -236,7 +255,7 @@ class Loop {
   /// Float inside the linear solver resolves what is left of the cost no longer.
   bool precise_ = false;
   int small_decreases_ = 0;
-  double last_decrease_ = 1;
+  double last_decrease_ = 1, stretch_ = 1;
   bool any_finite_trial_ = false;
   bool begun_ = false, done_ = false;
 };

@@ -30,12 +30,14 @@ struct LoopHistory {
   bool precise = false;
   int small_decreases = 0;
   double last_decrease = 1;  ///< relative, of the cost
+  double stretch = 1;        ///< of the next step
 
   /// The loss has another scale: other costs, and unless it is much alike another curvature.
   void rescale(bool alike) {
     if (!alike) control.floor = {};
     control.raise = false;
     costs_known = false;
+    stretch = 1;
     small_decreases = 0;
   }
 };

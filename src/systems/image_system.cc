@@ -121,6 +121,7 @@ Costs ImageSystem::costs_of(const State& state) const {
 }
 
 Step ImageSystem::propose(const StepRequest& request) {
+  stretch_ = request.stretch;
   const bool same_loss = request.loss == loss_;
   loss_ = request.loss;
   if (!linearized_ || !same_loss) linearize(held_);
@@ -137,7 +138,9 @@ Step ImageSystem::propose(const StepRequest& request) {
 
 Trial ImageSystem::trial() {
   Trial out;
-  out.step_norm = camera_columns_.step(held_.cameras, stage_.step(), tried_.cameras);
+  const Buffer<double>& step = stage_.step();
+  out.step_norm = camera_columns_.step(
+      held_.cameras, stretch_ == 1 ? step : stage_.blend(stretch_, 0, step), tried_.cameras);
   write_records(tried_);
   linearize(tried_);
   const Costs costs = costs_of(tried_);

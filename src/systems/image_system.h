@@ -64,6 +64,7 @@ class ImageSystem : public Home {
   bool lenses_free_;
   State held_, tried_;
   bool linearized_ = false;  ///< held_.sums are of the held state under loss_
+  double stretch_ = 1;       ///< of the last proposal
   ScaledLoss loss_;
   Buffer<double> diagonal_;  ///< kDiagonalDoubles per image
   CameraStage stage_;

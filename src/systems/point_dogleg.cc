@@ -16,7 +16,7 @@ bool PointSystem::only_radius_is_new(const StepRequest& request) const {
 /// Whether the radius cuts the Newton point off is known once it was tried; where it is to be
 /// expected, one pass finds out. Steepest descent is computed where it does, once for a state.
 Trial PointSystem::trial() {
-  if (!request_.dogleg) return try_step({});
+  if (!request_.dogleg) return try_step({request_.stretch, 0});
   std::optional<Trial> newton;
   if (!plane_ && std::isinf(request_.radius))
     newton = try_step({});
@@ -64,6 +64,7 @@ void PointSystem::measure_descent() {
 
 const Buffer<double>& PointSystem::blend_cameras(const DoglegStep& step) {
   if (step.is_newton()) return stage_.step();
+  if (step.descent == 0) return stage_.blend(step.newton, 0, stage_.step());
   return stage_.blend(step.newton, step.descent, passes_->direction());
 }
 

@@ -196,8 +196,9 @@ PointTrial PointSystem::point_trial(const DoglegStep& step) const {
   out.own.worth = std::max(inner_iterations::kLeastWorth,
                            std::min(inner_iterations::kWorthOne,
                                     inner_iterations::kWorthOfLast * request_.last_decrease));
-  if (plane_ && !rules_.held) {
-    out.blend.newton = step.newton;
+  if (rules_.held) return out;
+  out.blend.newton = step.newton;
+  if (plane_) {
     out.blend.descent = step.descent * request_.damping;
     out.blend.inner_damping *= std::max(1.0, damping_of(*plane_, step) / request_.damping);
   }

@@ -16,6 +16,9 @@ struct StepRequest {
   ScaledLoss loss{};     ///< of the held state's cost, of the step and of its trial
   /// Relative decrease of the cost by the last step: points settle as exactly as this is worth.
   double last_decrease = 1;
+  /// The trial is this many times the step; its predicted decrease is that of the step itself. Not
+  /// with a dogleg. A system may not know how and try the step.
+  double stretch = 1;
   const std::function<bool()>* cancelled = nullptr;  ///< asked now and then during long solves
   bool precise = false;  ///< solve in double, even where float would do for the way there
   /// Keep what a smaller radius at the same state needs, and the trial within the radius.

@@ -86,11 +86,11 @@ TEST(History, GoesOnAsIfNothingHadHappened) {
   for (CameraSolverKind solver :
        {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
         CameraSolverKind::iterative_implicit})
-    for (LossKind loss : {LossKind::none, LossKind::huber}) {
+    for (LossKind loss : {LossKind::none, LossKind::huber, LossKind::tukey}) {
       SCOPED_TRACE(testing::Message() << static_cast<int>(solver) << " " << to_string(loss));
       SolveOptions options;
       options.solver = solver;
-      options.loss = {loss, 1.5};
+      options.loss = {loss, loss == LossKind::tukey ? 4.0 : 1.5};
       expect_equal_runs(problem, options);
     }
 }
