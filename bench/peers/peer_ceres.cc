@@ -11,6 +11,7 @@
 //   eta=0.1  radius=1e4           forcing, first trust region radius
 //   huber=1.5 | soft_l1=1.5 | cauchy=1.5 | tukey=1.5    a loss with its scale in pixels
 //   inner                         inner iterations of the points, as sheaf takes
+//   nonmonotonic                  steps may go up for a while; what counts is the best state so far
 //   nok2                          holds k2, as --fix k2
 // --fix takes points, poses, intrinsics, f, k1, k2.
 #include <ceres/ceres.h>
@@ -170,6 +171,7 @@ bool choose_solver(peer::Config& config, ceres::Solver::Options& options) {
   }
   options.eta = config.value("eta", 0.1);
   options.initial_trust_region_radius = config.value("radius", 1e4);
+  options.use_nonmonotonic_steps = config.has("nonmonotonic");
   return true;
 }
 
@@ -259,6 +261,7 @@ int solve(const peer::Arguments& arguments) {
   if (!peer::read_bal(arguments.input, file)) return 3;
 
   peer::RunRecord record;
+  if (options.use_nonmonotonic_steps) record.ends_with_best();
   record.start();
   ceres::Problem problem;
   build(file, words, problem, options);

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -144,10 +145,13 @@ void RunRecord::add(double cost, bool accepted) { add_at(now(), cost, accepted);
 void RunRecord::add_at(double time_s, double cost, bool accepted) {
   if (accepted && !trace_.empty()) {
     decrease_before_ = decrease_;
-    decrease_ = cost > 0 ? (trace_.back().second - cost) / cost : 0;
+    decrease_ = cost > 0 ? (held_ - cost) / cost : 0;
+    if (with_best_) decrease_ = std::abs(decrease_);
   }
   // What was tried and refused is nobody's state.
-  trace_.emplace_back(time_s, accepted || trace_.empty() ? cost : trace_.back().second);
+  if (accepted || trace_.empty()) held_ = cost;
+  const bool better = !with_best_ || trace_.empty() || held_ < trace_.back().second;
+  trace_.emplace_back(time_s, better ? held_ : trace_.back().second);
 }
 
 void RunRecord::add_with_tries(double cost, const std::vector<double>& refused_s) {

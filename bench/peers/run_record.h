@@ -60,6 +60,9 @@ class RunRecord {
   void add_with_tries(double cost, const std::vector<double>& refused_s);
   void finish();                                ///< the solver returned
   void counts_in_float() { in_float_ = true; }  ///< costs and states are rounded to float
+  /// Accepted steps may go up, and the peer ends with the best state of all: the trace has the best
+  /// cost so far, and the last decreases are those of the steps, up or down.
+  void ends_with_best() { with_best_ = true; }
 
   /// Target reached, time spent, or two accepted steps in a row whose relative decrease is at most
   /// the tolerance: the one stopping rule of all solvers. (Costs in float cannot show a decrease of
@@ -72,7 +75,8 @@ class RunRecord {
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   double start_s_ = 0, paused_s_ = 0, pause_begin_s_ = 0, setup_s_ = 0, total_s_ = 0;
   double cpu_start_s_ = 0, cpu_s_ = 0;
-  bool in_float_ = false;
+  bool in_float_ = false, with_best_ = false;
+  double held_ = infinity;                                   // cost of the state held now
   double decrease_ = infinity, decrease_before_ = infinity;  // relative, of the last accepted steps
 };
 
