@@ -5,6 +5,7 @@
 // hand. The words of --config:
 //   eigen | cholmod               linear solver of the reduced camera matrix
 //   lambda=1e-2                   first damping (g2o's own rule when absent)
+//   huber=1.5 | cauchy=1.5        a loss with its scale in pixels; the trace has its cost
 //   vertices                      points that are held stay vertices of the graph, marked as fixed;
 //                                 without it they are constants of edges with one vertex, which is
 //                                 quicker
@@ -16,6 +17,7 @@
 #include <g2o/core/block_solver.h>
 #include <g2o/core/hyper_graph_action.h>
 #include <g2o/core/optimization_algorithm_levenberg.h>
+#include <g2o/core/robust_kernel_impl.h>
 #include <g2o/core/sparse_optimizer.h>
 #include <g2o/solvers/eigen/linear_solver_eigen.h>
 #ifdef PEER_G2O_CHOLMOD
@@ -187,7 +189,7 @@ class Watch final : public g2o::HyperGraphAction {
   void record() {
     record_.pause();
     graph_.computeActiveErrors();  // those of the last trial may be left
-    const double cost = 0.5 * graph_.activeChi2();
+    const double cost = 0.5 * graph_.activeRobustChi2();
     record_.resume();
     record_.add_with_tries(cost, tries_.take_refused());
     stop_ = record_.over(arguments_);
@@ -206,7 +208,21 @@ struct Plan {
   bool cholmod, eigen;
   double lambda;
   bool hold_points, as_vertices;
+  double huber, cauchy;  // scales of a loss in px; 0: not that one
 };
+
+/// A new one for each observation, which owns it; null without a loss.
+g2o::RobustKernel* new_kernel(const Plan& plan) {
+  g2o::RobustKernel* kernel = nullptr;
+  if (plan.huber > 0) {
+    kernel = new g2o::RobustKernelHuber;
+    kernel->setDelta(plan.huber);
+  } else if (plan.cauchy > 0) {
+    kernel = new g2o::RobustKernelCauchy;
+    kernel->setDelta(plan.cauchy);
+  }
+  return kernel;
+}
 
 template <int Size>
 std::unique_ptr<g2o::Solver> choose_solver(const Plan& plan, Tries& tries) {
@@ -250,6 +266,7 @@ void build(const peer::BalFile& file, const Plan& plan, g2o::SparseOptimizer& gr
     edge->setVertex(0, graph.vertex(o.camera));
     edge->setMeasurement({o.u, o.v});
     edge->setInformation(g2o::Matrix2::Identity());
+    edge->setRobustKernel(new_kernel(plan));
     graph.addEdge(edge);
   };
   if (plan.hold_points && !plan.as_vertices) {
@@ -327,8 +344,10 @@ int solve(const peer::Arguments& arguments, const Plan& plan) {
 
 int solve(const peer::Arguments& arguments) {
   peer::Config config(arguments.config);
-  const Plan plan{config.has("cholmod"), config.has("eigen"), config.value("lambda", 0),
-                  arguments.fix.count("points") > 0, config.has("vertices")};
+  const Plan plan{config.has("cholmod"),     config.has("eigen"),
+                  config.value("lambda", 0), arguments.fix.count("points") > 0,
+                  config.has("vertices"),    config.value("huber", 0),
+                  config.value("cauchy", 0)};
   if (!config.unknown().empty()) {
     std::fprintf(stderr, "unknown configuration '%s'\n", arguments.config.c_str());
     return 2;
