@@ -3,11 +3,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The cost of a BAL state, evaluated apart from every solver: evaluate.py ORIGINAL [FINAL...]
 
-1/2 sum |r|^2 in px^2, no loss. The observations are always those of ORIGINAL, so a solver that
+1/2 sum |r|^2 in px^2, or 1/2 sum rho(|r|^2) with a loss. The observations are always those of ORIGINAL, so a solver that
 drops or changes some cannot look better for it. Uses NumPy when it is there, else plain Python.
 Large files go to the program peer-evaluate (bench/peers), which shares no code with an engine.
 """
 import math
+import re
 import subprocess
 import sys
 
@@ -17,6 +18,25 @@ except ImportError:  # slower, and the same to rounding
     numpy = None
 
 LARGE = 200_000  # observations from which on the program is asked, when it is there
+# rho / c^2 of z = |r|^2 / c^2, by the words that the peers' configurations have for it.
+LOSSES = {"huber": lambda z: z if z <= 1 else 2 * math.sqrt(z) - 1,
+          "soft_l1": lambda z: 2 * (math.sqrt(1 + z) - 1),
+          "cauchy": math.log1p,
+          "tukey": lambda z: (1 - max(0.0, 1 - z) ** 3) / 3}
+
+
+def loss_of(config):
+    """(word, scale in px) of the loss among a configuration's words, or None."""
+    found = re.search(rf"(?:^|-)({'|'.join(LOSSES)})=([0-9.]+)", config)
+    return (found[1], float(found[2])) if found else None
+
+
+def half_sum(squares, loss):
+    """1/2 sum rho(|r|^2) of the observations' squares."""
+    if loss:
+        rho, c2 = LOSSES[loss[0]], loss[1] ** 2
+        squares = (c2 * rho(s / c2) for s in squares)
+    return 0.5 * math.fsum(squares)
 
 
 def read_bal(path):
@@ -46,7 +66,7 @@ def rotation(w):
             [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)]]
 
 
-def plain_cost(observations, cameras, points):
+def plain_cost(observations, cameras, points, loss=None):
     rotations = [rotation(cameras[9 * i:9 * i + 3]) for i in range(len(cameras) // 9)]
     squares = []
     for k in range(0, len(observations), 4):
@@ -56,12 +76,12 @@ def plain_cost(observations, cameras, points):
         x, y = -P[0] / P[2], -P[1] / P[2]
         n = x * x + y * y
         scale = c[6] * (1 + n * (c[7] + n * c[8]))
-        squares.append((scale * x - observations[k + 2]) ** 2)
-        squares.append((scale * y - observations[k + 3]) ** 2)
-    return 0.5 * math.fsum(squares)
+        squares.append((scale * x - observations[k + 2]) ** 2 +
+                       (scale * y - observations[k + 3]) ** 2)
+    return half_sum(squares, loss)
 
 
-def array_cost(observations, cameras, points):
+def array_cost(observations, cameras, points, loss=None):
     o, c, X = (numpy.asarray(a).reshape(-1, n)
                for a, n in ((observations, 4), (cameras, 9), (points, 3)))
     camera, point = o[:, 0].astype(int), o[:, 1].astype(int)
@@ -71,19 +91,20 @@ def array_cost(observations, cameras, points):
     n = (p * p).sum(axis=1)
     f, k1, k2 = c[camera, 6:].T
     r = (f * (1 + n * (k1 + n * k2)))[:, None] * p - o[:, 2:]
-    return 0.5 * math.fsum((r * r).ravel())
+    return half_sum((r * r).sum(axis=1).tolist(), loss)
 
 
-def cost(original, final, program=None):
-    """Cost of the state in file `final` on the observations of file `original`."""
+def cost(original, final, program=None, loss=None):
+    """Cost of the state in file `final` on the observations of file `original`. The program knows no
+    loss, a (word, scale) of LOSSES."""
     with open(original) as file:
         large = int(file.readline().split()[2]) >= LARGE
-    if program and large:
+    if program and large and not loss:
         return float(subprocess.run([program, original, final], check=True, capture_output=True,
                                     text=True).stdout)
     observations = read_bal(original)[0]
     _, cameras, points = read_bal(final)
-    return (array_cost if numpy else plain_cost)(observations, cameras, points)
+    return (array_cost if numpy else plain_cost)(observations, cameras, points, loss)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import xml.dom.minidom
 
 import cost_plot
 import evaluate
+import losses
 import old_new
 import run_table
 import side_by_side
@@ -64,6 +65,12 @@ def check_evaluation():
         assert math.isclose(evaluate.cost(path, path), expected, rel_tol=1e-12)
         assert math.isclose(evaluate.plain_cost(observations, cameras, points), expected,
                             rel_tol=1e-12)
+        # Beyond 0.5 px Huber counts 2 * 0.5 * 1 - 0.5^2 instead of 1.
+        loss = evaluate.loss_of("eigen-lambda=1e-2-huber=0.5")
+        assert loss == ("huber", 0.5) and evaluate.loss_of("eigen-lambda=1") is None
+        assert math.isclose(evaluate.cost(path, path, None, loss), 0.5 * (0.75 + 0.04 ** 2),
+                            rel_tol=1e-12)
+        assert math.isclose(evaluate.half_sum([3.0], ("cauchy", 1.0)), 0.5 * math.log(4.0))
 
 
 def check_table():
@@ -108,7 +115,7 @@ def check_sheaf_adapter():
                                    "precision": "double", "termination": {"code": "x"},
                                    "final_cost": 4.0}, "auto", 1, 99)
     assert run["sheaf"]["gradient"] == [8.0, 6.0] and run["sheaf"]["linear_iterations"] == [1, 2]
-    assert run["trace"] == [[0.25, 9.0], [1.25, 4.0]]
+    assert run["trace"] == [[0.25, 9.0], [0.75, 9.0], [1.25, 4.0]]
     assert run["seconds_per_iteration"] == 0.5 and run["total_s"] == 1.25
 
 
@@ -203,6 +210,27 @@ def check_ladder():
         assert [cameras[8], cameras[17], cameras[16]] == [0, 0, 0.5] and len(points) == 6
 
 
+def check_losses():
+    assert losses.read_scene("a=b/c.txt@0.25") == ("a", "b/c.txt", 0.25)
+    (_, config, _), = losses.with_loss([("g2o", "eigen-lambda=1e-2", "p")], "cauchy", 1.0)
+    assert config == "eigen-lambda=1e-2-cauchy=2.54863762395"
+    assert losses.without_loss(config) == "eigen-lambda=1e-2"
+    trace = [[0.0, 500.0], [1.0, 500.0], [2.0, 100.05]]
+    runs = [{**canned_run("ceres", trace, 100.05), "config": "a-huber=1"},
+            {**canned_run("ceres", [[2.5, 100.0]], 100.0), "config": "b-huber=1"},
+            {**canned_run("ceres", [[9.0, 100.0]], 100.0), "config": "c-huber=1"},
+            {**canned_run("sheaf", [[0.1, 500.0], [0.5, 100.0]], 100.0), "config": "auto-huber=1"},
+            {**canned_run("g2o", [[1, 500.0]], 500.0, cut=True, limit_s=7), "config": "x-huber=1"}]
+    assert losses.near_best(runs, "ceres", 100.0) == ["a-huber=1", "b-huber=1"]
+    assert losses.steps_to(trace, 101.0) == 2 and losses.steps_to(trace, 100.0) is None
+    document = {"scene": "a", "loss": "huber", "runs": runs, "best_cost": 100.0,
+                "summary": run_table.summarise(runs, 100.0)}
+    text = losses.tables({"problems": [document]})
+    assert "| a | 0.001 | 0.500 (1) | 2.00 (2) | **4** | a | > 7 | > 14 |  |" in text, text
+    assert "| a | 1e-06 | 0.500 (1) | 2.50 (0) | **5** | b | > 7 | > 14 |  |" in text, text
+    xml.dom.minidom.parseString(losses.picture(document))
+
+
 def check_old_new():
     # Fewer than 6 of 21 coins show heads with probability 0.0133, fewer than 7 with 0.0392.
     assert old_new.sign_interval([float(i) for i in range(1, 22)]) == (6.0, 16.0)
@@ -217,7 +245,7 @@ def check_old_new():
 
 def run():
     for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages,
-                  check_suite, check_ladder, check_old_new):
+                  check_suite, check_ladder, check_losses, check_old_new):
         check()
         print(f"{check.__name__}: passed")
     return 0

@@ -55,6 +55,7 @@ def parse_arguments():
                         help="after this nothing new is started")
     parser.add_argument("--optimum", type=float, default=math.inf,
                         help="a known cost of the (one) problem, when it is below what is found")
+    parser.add_argument("--cost-target", type=float, help="ends a peer's run that is at or below it")
     parser.add_argument("--machine", help="JSON of bench-machine, to be kept with the results")
     parser.add_argument("--out", default="build/bench")
     parser.add_argument("--self-test", action="store_true")
@@ -76,6 +77,8 @@ def run_once(program, name, config, problem, threads, options, folder):
     line = [os.path.abspath(program), os.path.abspath(problem), "--config", config, "--threads",
             str(threads), "--max-iterations", str(options.max_iterations),
             "--time-limit", str(options.time_limit), "--out", final]
+    if options.cost_target is not None:
+        line += ["--cost-target", repr(options.cost_target)]
     if os.path.exists(final):
         os.remove(final)
     # Libraries inside a peer (BLAS, OpenMP) get the same count as the peer.
@@ -97,8 +100,8 @@ def run_once(program, name, config, problem, threads, options, folder):
     except ValueError:  # a cost that is not a number, for one
         return {**run, "failed": f"wrote no JSON: {done.stdout.strip()[-60:]}"}
     run["cut"] = run["total_s"] >= limit
-    run["final_cost_independent"] = evaluate.cost(problem, final,
-                                                  find_program("evaluate", options.peers))
+    run["final_cost_independent"] = evaluate.cost(
+        problem, final, find_program("evaluate", options.peers), evaluate.loss_of(config))
     own, other = run["final_cost"], run["final_cost_independent"]
     run["disagreement"] = abs(own - other) / max(own, other, sys.float_info.min)
     run["agrees"] = run["disagreement"] <= AGREEMENT[run.get("cost_in", "double")]
@@ -204,13 +207,13 @@ def median_run(runs, row):
     return mine[len(mine) // 2]
 
 
-def curves(document):
-    """Each solver's quickest configuration, sheaf first; labels and traces."""
+def curves(document, tau="0.001"):
+    """Each solver's quickest configuration to f*(1 + tau), sheaf first; labels and traces."""
     chosen = {}
     comparable = [r for r in document["summary"] if r["runs"] and r["agrees"]]
-    for row in sorted(comparable, key=run_table.speed):
+    for row in sorted(comparable, key=lambda r: run_table.speed(r, tau)):
         chosen.setdefault(row["name"], row)
-    rows = sorted(chosen.values(), key=lambda r: (r["name"] != "sheaf", run_table.speed(r)))
+    rows = sorted(chosen.values(), key=lambda r: (r["name"] != "sheaf", run_table.speed(r, tau)))
     return [(row["name"] if row["name"] == "sheaf" else f"{row['name']} {row['config']}",
              median_run(document["runs"], row)["trace"])
             for row in rows[:len(cost_plot.COLOURS)]]

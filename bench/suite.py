@@ -212,7 +212,7 @@ def write_pages(results, options):
 
 def main():
     options = parse_arguments()
-    options.optimum = math.inf
+    options.optimum, options.cost_target = math.inf, None
     options.deadline = time.time() + 60 * options.budget_minutes
     path = os.path.join(options.out, "results.json")
     results = {"version": 1, "date": time.strftime("%Y-%m-%d"),

@@ -4,7 +4,8 @@
 """The sheaf command on a file, in the peers' terms.
 
 The words of --config, joined by '-': auto | dense | sparse | explicit | implicit (camera solver; the
-last two iterative), fix=k2, simd=avx2, damping=0.001.
+last two iterative), fix=k2, simd=avx2, damping=0.001, and a loss with its scale in pixels: huber=1.5 |
+soft_l1=1.5 | cauchy=1.5 | tukey=1.5.
 The command is $SHEAF_COMMAND, or `sheaf` on the PATH. CPU use is the whole process's, reading and
 writing included; times are those of set-up and solving, as for the peers.
 """
@@ -53,16 +54,19 @@ def command_line(a, json_path):
             line += ["--simd", value]
         elif name == "damping":
             line += ["--initial-damping", value]
+        elif name in ("huber", "soft_l1", "cauchy", "tukey"):
+            line += ["--loss", name.replace("_", "-") + ":" + value]
         else:
             sys.exit(f"unknown configuration '{a.config}'")
     return line
 
 
 def run_document(document, config, threads, cpu_percent):
-    """The peers' JSON from that of `sheaf solve`: only accepted states enter the trace."""
+    """The peers' JSON from that of `sheaf solve`. The trace has every step that was tried; after one
+    that was refused, the cost is that of the state held before."""
     setup = document["time"]["setup_s"]
     steps = document["iterations"]
-    trace = [[setup + s["time_s"], s["cost"]] for s in steps if s["accepted"]]
+    trace = [[setup + s["time_s"], s["cost"]] for s in steps]
     tried = len(steps) - 1
     last = steps[-1]["time_s"] - steps[0]["time_s"]
     return {"solver": "sheaf", "config": config, "threads": threads, "setup_s": setup,
