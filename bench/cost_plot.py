@@ -97,6 +97,17 @@ def grid(x, y):
     return parts
 
 
+def thinned(places, most=200, apart=4):
+    """Of a curve of very many points, the ends and those that are some pixels apart."""
+    if len(places) <= most:
+        return places
+    kept = [places[0]]
+    for at in places[1:-1]:
+        if math.hypot(at[0] - kept[-1][0], at[1] - kept[-1][1]) >= apart:
+            kept.append(at)
+    return kept + [places[-1]]
+
+
 def chart(title, x, y, names, curves):
     """The frame and its curves: `x` and `y` axes, `names` of the two, `curves` a list of (label,
     places in pixels). The first is drawn last, on top. Returns the SVG text."""
@@ -111,6 +122,7 @@ def chart(title, x, y, names, curves):
                f'text-anchor="middle">{escape(names[1])}</text>')
     for i, (label, places) in reversed(list(enumerate(curves))):
         colour, kind = COLOURS[i % len(COLOURS)], MARKS[i % len(MARKS)]
+        places = thinned(places)
         path = "L".join(f"{a:.1f},{b:.1f}" for a, b in places)
         out.append(f'<path d="M{path}" fill="none" stroke="{colour}" '
                    f'stroke-width="{2.5 if i == 0 else 1.6}"/>')

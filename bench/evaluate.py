@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The cost of a BAL state, evaluated apart from every solver: evaluate.py ORIGINAL [FINAL...]
 
-1/2 sum |r|^2 in px^2, or 1/2 sum rho(|r|^2) with a loss. The observations are always those of ORIGINAL, so a solver that
+1/2 sum |r|^2 in px^2, or 1/2 sum rho(|r|^2) with a loss. The observations are always those of
+ORIGINAL, so a solver that
 drops or changes some cannot look better for it. Uses NumPy when it is there, else plain Python.
 Large files go to the program peer-evaluate (bench/peers), which shares no code with an engine.
 """
