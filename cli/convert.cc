@@ -42,6 +42,8 @@ Json cleaned_json(const CleanOptions& options, const CleanRecord& record) {
           {"observations", record.observations},
           {"far_off", list_json(record.far_off)},
           {"behind", list_json(record.behind)},
+          {"in_plane", list_json(record.in_plane)},
+          {"at_centre", list_json(record.at_centre)},
           {"repeated", list_json(record.repeated)},
           {"narrow", list_json(record.narrow)},
           {"short_tracks", list_json(record.short_tracks)}};
@@ -49,11 +51,10 @@ Json cleaned_json(const CleanOptions& options, const CleanRecord& record) {
 
 void print_cleaned(const CleanRecord& r) {
   fmt::print(
-      "left out    {} observations: {} far off, {} behind, {} repeated, the others of {} points "
-      "with "
-      "narrow rays and {} short tracks\n",
-      r.observations, r.far_off.size(), r.behind.size(), r.repeated.size(), r.narrow.size(),
-      r.short_tracks.size());
+      "left out    {} observations: {} far off, {} behind, {} in the plane of their camera, {} at "
+      "its centre, {} repeated, the others of {} points with narrow rays and {} short tracks\n",
+      r.observations, r.far_off.size(), r.behind.size(), r.in_plane.size(), r.at_centre.size(),
+      r.repeated.size(), r.narrow.size(), r.short_tracks.size());
 }
 
 int run(const Arguments& arguments) {
@@ -100,7 +101,8 @@ OptionTable<CleanOptions> clean_fields() {
                       .help = "leave out observations whose residual is longer, or not finite"}),
       F::flag(&CleanOptions::behind,
               {.name = "drop-behind",
-               .help = "leave out observations whose point lies behind the camera"}),
+               .help = "leave out observations whose point lies behind the camera, in its plane or "
+                       "at its centre"}),
       F::flag(&CleanOptions::repeated,
               {.name = "drop-repeated",
                .help = "leave out observations that occur twice, pixel and all"}),

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "geometry/rotation.h"
+#include "scene/camera_plane.h"
 #include "scene/point_errors.h"
 #include "scene/subset.h"
 
@@ -50,6 +51,18 @@ double angle_between(const Vector3<double>& a, const Vector3<double>& b) {
   const Vector3<double> c = cross(a, b);
   const double sine = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
   return std::atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+}
+
+/// An observation is in one list: at the centre, in the plane, or else behind.
+void find_behind(const Problem& problem, CleanRecord& record) {
+  PlaneSights sights = plane_sights(problem);
+  record.in_plane = std::move(sights.in_plane);
+  record.at_centre = std::move(sights.at_centre);
+  std::vector<bool> named(problem.num_observations(), false);
+  for (const auto* list : {&record.in_plane, &record.at_centre})
+    for (const std::uint64_t i : *list) named[i] = true;
+  record.behind = evaluate(problem).behind;
+  std::erase_if(record.behind, [&](std::uint64_t i) { return named[i]; });
 }
 
 }  // namespace
@@ -104,9 +117,10 @@ CleanRecord clean(Problem& problem, const CleanOptions& options) {
     for (std::size_t i = 0; i < observations; ++i)
       if (!(lengths[i] <= options.max_error_px)) record.far_off.push_back(i);
   }
-  if (options.behind) record.behind = evaluate(problem).behind;
+  if (options.behind) find_behind(problem, record);
   if (options.repeated) record.repeated = repetitions_in(problem).same_pixel;
-  for (const auto* list : {&record.far_off, &record.behind, &record.repeated})
+  for (const auto* list :
+       {&record.far_off, &record.behind, &record.in_plane, &record.at_centre, &record.repeated})
     for (const std::uint64_t i : *list) kept[i] = false;
   std::vector<bool> narrow(problem.num_points(), false);
   if (options.min_angle_deg > 0) {

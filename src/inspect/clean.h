@@ -12,7 +12,8 @@ namespace sheaf {
 /// What to leave out of a problem; nothing by default.
 struct CleanOptions {
   double max_error_px = 0;   ///< observations with a longer (or not finite) residual; 0: none
-  bool behind = false;       ///< observations whose point lies behind the camera
+  bool behind = false;       ///< observations whose point is behind the camera, in its plane or at
+                             ///< its centre
   bool repeated = false;     ///< observations of a point at a pixel where the image has it already
   double min_angle_deg = 0;  ///< points whose rays meet at less than this at most; 0: none
   std::uint32_t min_track = 0;  ///< points with fewer observations left
@@ -25,6 +26,8 @@ struct CleanOptions {
 struct CleanRecord {
   std::vector<std::uint64_t> far_off;       ///< observations, by their error
   std::vector<std::uint64_t> behind;        ///< observations
+  std::vector<std::uint64_t> in_plane;      ///< observations: Z = 0 in the camera
+  std::vector<std::uint64_t> at_centre;     ///< observations
   std::vector<std::uint64_t> repeated;      ///< observations
   std::vector<std::uint64_t> narrow;        ///< points, by the angle of their rays
   std::vector<std::uint64_t> short_tracks;  ///< points, of what the others left
