@@ -18,19 +18,37 @@
 namespace sheaf {
 namespace {
 
+constexpr const char* kObservations = "observations";
+
 struct Arguments {
   CommonOptions common;
   std::string in;
 };
 
-// "images 3, 17, 18 ..."
-std::string places_text(const Finding& finding) {
+// "images 3, 17, 18 ...", "observations 4 (image 0, point 2) ..."
+std::string places_text(const Finding& finding, const Problem& problem) {
   constexpr std::size_t kShown = 8;
   std::string out;
-  for (std::size_t k = 0; k < std::min(finding.first.size(), kShown); ++k)
-    out += fmt::format("{}{}", k == 0 ? " " : ", ", finding.first[k]);
+  for (std::size_t k = 0; k < std::min(finding.first.size(), kShown); ++k) {
+    const std::uint64_t i = finding.first[k];
+    out += fmt::format("{}{}", k == 0 ? " " : ", ", i);
+    if (finding.of == kObservations)
+      out += fmt::format(" (image {}, point {})", problem.observation_image[i],
+                         problem.observation_point[i]);
+  }
   if (out.empty()) return out;
   return fmt::format("            {}{}{}\n", finding.of, out, finding.count > kShown ? " ..." : "");
+}
+
+Json finding_json(const Finding& f, const Problem& problem) {
+  Json images = Json::array(), points = Json::array();
+  if (f.of == kObservations)
+    for (const std::uint64_t i : f.first) {
+      images.push_back(problem.observation_image[i]);
+      points.push_back(problem.observation_point[i]);
+    }
+  return {{"code", f.code},   {"grave", f.grave}, {"count", f.count}, {"of", f.of},
+          {"first", f.first}, {"images", images}, {"points", points}, {"words", f.words}};
 }
 
 int run(const Arguments& arguments) {
@@ -43,17 +61,11 @@ int run(const Arguments& arguments) {
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   for (const Finding& finding : findings)
     fmt::print("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
-               places_text(finding));
+               places_text(finding, input.problem));
   if (findings.empty()) fmt::print("nothing that looks wrong\n");
   if (json.empty()) return 0;
   Json list = Json::array();
-  for (const Finding& f : findings)
-    list.push_back({{"code", f.code},
-                    {"grave", f.grave},
-                    {"count", f.count},
-                    {"of", f.of},
-                    {"first", f.first},
-                    {"words", f.words}});
+  for (const Finding& finding : findings) list.push_back(finding_json(finding, input.problem));
   write_json({{"version", SHEAF_VERSION},
               {"input", input_json(arguments.in, input)},
               {"findings", list},

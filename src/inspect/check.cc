@@ -4,48 +4,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <numeric>
 
 #include "geometry/camera_model.h"
 #include "inspect/clean.h"
+#include "inspect/lens_findings.h"
+#include "inspect/lens_reach.h"
 #include "inspect/statistics.h"
+#include "scene/camera_plane.h"
 #include "scene/point_errors.h"
 
 namespace sheaf {
 namespace {
 
-constexpr std::size_t kMostListed = 1000;
 constexpr std::uint32_t kFewPoints = 10;  ///< of an image: 6 unknowns of its pose and some to spare
 constexpr double kNarrow_deg = 0.5;
 constexpr double kFarOff = 20;  ///< times the median residual
 
 using Numbers = std::vector<std::uint64_t>;
-
-std::string plural(std::uint64_t count, const char* one, const char* many) {
-  return std::to_string(count) + " " + (count == 1 ? one : many);
-}
-
-/// Three digits.
-std::string shown(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
-
-struct Report {
-  std::vector<Finding> findings;
-
-  void add(const char* code, bool grave, const char* of, const Numbers& which,
-           const std::string& words) {
-    if (which.empty()) return;
-    const std::size_t listed = std::min(which.size(), kMostListed);
-    findings.push_back({code, grave, which.size(), of,
-                        Numbers(which.begin(), which.begin() + static_cast<std::ptrdiff_t>(listed)),
-                        words});
-  }
-};
 
 /// Disjoint sets of images and points; a root is its own parent.
 class Parts {
@@ -61,7 +38,7 @@ class Parts {
   std::vector<std::size_t> parent_;
 };
 
-void check_parts(const Problem& problem, Report& report) {
+void check_parts(const Problem& problem, FindingList& list) {
   const std::size_t images = problem.num_images();
   Parts parts(images + problem.num_points());
   std::vector<bool> sees(images, false);
@@ -78,15 +55,15 @@ void check_parts(const Problem& problem, Report& report) {
   Numbers outside;
   for (std::size_t j = 0; j < images; ++j)
     if (sees[j] && parts.root(j) != largest->first) outside.push_back(j);
-  report.add("parts", true, "images", outside,
-             "the scene falls into " + std::to_string(sizes.size()) +
-                 " parts that share no point; " + plural(outside.size(), "image is", "images are") +
-                 " outside the largest (" + std::to_string(largest->second) +
-                 "): solve the parts by themselves, their places and sizes against each other mean "
-                 "nothing");
+  list.add("parts", true, "images", outside,
+           "the scene falls into " + std::to_string(sizes.size()) + " parts that share no point; " +
+               plural(outside.size(), "image is", "images are") + " outside the largest (" +
+               std::to_string(largest->second) +
+               "): solve the parts by themselves, their places and sizes against each other mean "
+               "nothing");
 }
 
-void check_images(const Problem& problem, Report& report) {
+void check_images(const Problem& problem, FindingList& list) {
   std::vector<std::uint32_t> seen(problem.num_images(), 0);
   for (const std::uint32_t j : problem.observation_image) ++seen[j];
   Numbers blind, weak;
@@ -94,17 +71,17 @@ void check_images(const Problem& problem, Report& report) {
     if (seen[j] == 0) blind.push_back(j);
     if (seen[j] > 0 && seen[j] < kFewPoints) weak.push_back(j);
   }
-  report.add("blind-images", true, "images", blind,
-             plural(blind.size(), "image observes", "images observe") +
-                 " nothing: nothing determines their poses, they stay as they are");
-  report.add("weak-images", true, "images", weak,
-             plural(weak.size(), "image observes", "images observe") + " fewer than " +
-                 std::to_string(kFewPoints) +
-                 " points: their poses are weak or not determined (3 points are the least); find "
-                 "more matches, or leave them out");
+  list.add("blind-images", true, "images", blind,
+           plural(blind.size(), "image observes", "images observe") +
+               " nothing: nothing determines their poses, they stay as they are");
+  list.add("weak-images", true, "images", weak,
+           plural(weak.size(), "image observes", "images observe") + " fewer than " +
+               std::to_string(kFewPoints) +
+               " points: their poses are weak or not determined (3 points are the least); find "
+               "more matches, or leave them out");
 }
 
-void check_points(const Problem& problem, Report& report) {
+void check_points(const Problem& problem, FindingList& list) {
   std::vector<std::uint32_t> tracks(problem.num_points(), 0);
   for (const std::uint32_t p : problem.observation_point) ++tracks[p];
   const std::vector<double> angles =
@@ -114,19 +91,18 @@ void check_points(const Problem& problem, Report& report) {
     if (tracks[p] < 2) lone.push_back(p);
     if (tracks[p] >= 2 && angles[p] < kNarrow_deg) narrow.push_back(p);
   }
-  report.add("lone-points", true, "points", lone,
-             plural(lone.size(), "point has", "points have") +
-                 " fewer than two observations: their distance is not determined; leave them out "
-                 "(convert --min-track 2)");
-  report.add(
-      "narrow-points", false, "points", narrow,
-      plural(narrow.size(), "point's", "points'") + " rays meet at less than " +
-          shown(kNarrow_deg) +
-          " degrees: their depth is hardly determined; leave them out (convert --min-angle)");
+  list.add("lone-points", true, "points", lone,
+           plural(lone.size(), "point has", "points have") +
+               " fewer than two observations: their distance is not determined; leave them out "
+               "(convert --min-track 2)");
+  list.add("narrow-points", false, "points", narrow,
+           plural(narrow.size(), "point's", "points'") + " rays meet at less than " +
+               shown(kNarrow_deg) +
+               " degrees: their depth is hardly determined; leave them out (convert --min-angle)");
 }
 
 /// More unknowns than measurements, whatever their arrangement; the 7 of the gauge are free.
-void check_rank(const Problem& problem, Report& report) {
+void check_rank(const Problem& problem, FindingList& list) {
   std::uint64_t lenses = 0;
   std::vector<bool> used(problem.cameras.size(), false);
   for (const std::uint32_t c : problem.image_camera) used[c] = true;
@@ -137,7 +113,7 @@ void check_rank(const Problem& problem, Report& report) {
   const std::uint64_t unknowns = 6 * problem.num_images() + 3 * problem.num_points() + lenses;
   const std::uint64_t measured = 2 * problem.num_observations();
   if (measured + 7 >= unknowns) return;
-  report.findings.push_back(
+  list.findings.push_back(
       {"rank",
        true,
        unknowns - 7 - measured,
@@ -148,86 +124,96 @@ void check_rank(const Problem& problem, Report& report) {
            "poses) or find more matches"});
 }
 
-void check_duplicates(const Problem& problem, Report& report) {
+void check_duplicates(const Problem& problem, FindingList& list) {
   const auto [same, again] = repetitions_in(problem);
-  report.add("repeated-observations", true, "observations", same,
-             plural(same.size(), "observation occurs", "observations occur") +
-                 " twice, pixel and all: they count double; leave them out (convert "
-                 "--drop-repeated)");
-  report.add("two-pixels", false, "observations", again,
-             plural(again.size(), "observation sees", "observations see") +
-                 " a point in an image that has it at another pixel too: one of the two matches is "
-                 "wrong; a robust loss (--loss cauchy:auto) bears it");
+  list.add("repeated-observations", true, "observations", same,
+           plural(same.size(), "observation occurs", "observations occur") +
+               " twice, pixel and all: they count double; leave them out (convert "
+               "--drop-repeated)");
+  list.add("two-pixels", false, "observations", again,
+           plural(again.size(), "observation sees", "observations see") +
+               " a point in an image that has it at another pixel too: one of the two matches is "
+               "wrong; a robust loss (--loss cauchy:auto) bears it");
 }
 
-void check_residuals(const Problem& problem, Report& report) {
-  const Evaluation evaluation = evaluate(problem);
-  report.add(
-      "behind-camera", true, "observations", evaluation.behind,
-      plural(evaluation.behind.size(), "observation's", "observations'") +
-          " point lies behind its camera, or beyond what its lens can see: wrong matches or "
-          "a bad start; leave them out (convert --drop-behind, solve --cheirality hold-out)");
-  report.add("not-finite", true, "observations", evaluation.not_finite,
-             plural(evaluation.not_finite.size(), "observation has", "observations have") +
-                 " a residual that is not finite: a point in the plane of its camera, or absurd "
-                 "parameters; leave them out (convert --max-error)");
-  std::vector<double> lengths = residual_lengths(problem);
-  const std::vector<double> all = lengths;
+/// Observations that a finding names already.
+using Named = std::vector<bool>;
+
+void name(const Numbers& which, Named& named) {
+  for (const std::uint64_t i : which) named[i] = true;
+}
+
+void check_measurements(const Numbers& absurd, FindingList& list, Named& named) {
+  list.add("absurd-measurements", true, "observations", absurd,
+           plural(absurd.size(), "observation is", "observations are") +
+               " where no image can hold it: outside by more than the image's size, or, where that "
+               "is not known, farther from the principal point than 100 times the median; a "
+               "damaged file or another unit; leave them out (convert --max-error)");
+  name(absurd, named);
+}
+
+void check_planes(const Problem& problem, FindingList& list, Named& named) {
+  const PlaneSights sights = plane_sights(problem);
+  const char* const remedy =
+      ": wrong matches or a bad start; leave them out (solve --cheirality hold-out, convert "
+      "--drop-behind)";
+  list.add("camera-plane", true, "observations", sights.in_plane,
+           plural(sights.in_plane.size(), "observation's", "observations'") +
+               " point lies in the plane of its camera (Z = 0), where it has no pixel" + remedy);
+  list.add("camera-centre", true, "observations", sights.at_centre,
+           plural(sights.at_centre.size(), "observation's", "observations'") +
+               " point lies at the centre of its camera up to rounding, where any pixel is as "
+               "good as any other" +
+               remedy);
+  name(sights.in_plane, named);
+  name(sights.at_centre, named);
+}
+
+void check_residuals(const Problem& problem, FindingList& list, const Named& named) {
+  Evaluation evaluation = evaluate(problem);
+  for (Numbers* which : {&evaluation.behind, &evaluation.not_finite})
+    std::erase_if(*which, [&](std::uint64_t i) { return named[i]; });
+  list.add("behind-camera", true, "observations", evaluation.behind,
+           plural(evaluation.behind.size(), "observation's", "observations'") +
+               " point lies behind its camera, or beyond what its lens can see: wrong matches or "
+               "a bad start; leave them out (convert --drop-behind, solve --cheirality hold-out)");
+  list.add("not-finite", true, "observations", evaluation.not_finite,
+           plural(evaluation.not_finite.size(), "observation has", "observations have") +
+               " a residual that is not finite: numbers so large that they overflow; leave them "
+               "out (convert --max-error)");
+  const std::vector<double> all = residual_lengths(problem);
+  std::vector<double> lengths = all;
   std::erase_if(lengths, [](double x) { return !std::isfinite(x); });
   const double median = range_of(std::move(lengths)).median;
   if (!(median > 0)) return;
   Numbers far;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i] > kFarOff * median) far.push_back(i);
-  report.add("far-off", false, "observations", far,
-             plural(far.size(), "observation is", "observations are") + " off by more than " +
-                 shown(kFarOff * median) + " px, " + shown(kFarOff) +
-                 " times the median: probably wrong matches; take a robust loss (--loss "
-                 "cauchy:auto) or leave them out (convert --max-error)");
-}
-
-/// Against the size of the images where it is known, else against how far measurements reach.
-void check_focals(const Problem& problem, Report& report) {
-  std::vector<double> size(problem.cameras.size(), 0);
-  for (std::size_t i = 0; i < problem.num_observations(); ++i) {
-    const std::uint32_t c = problem.image_camera[problem.observation_image[i]];
-    const bool centred = problem.cameras[c].model == CameraModel::bal;
-    for (std::size_t k = 0; k < 2; ++k)
-      size[c] = std::max(size[c], (centred ? 2 : 1) * std::abs(problem.observation_xy[2 * i + k]));
-  }
-  Numbers absurd;
-  for (std::size_t c = 0; c < size.size(); ++c) {
-    const Camera& camera = problem.cameras[c];
-    const auto stated = static_cast<double>(std::max(camera.width_px, camera.height_px));
-    const double width = stated > 0 ? stated : size[c];
-    const ParameterRoles roles = roles_of(camera.model);
-    for (const int which : {roles.fx, roles.fy}) {
-      const double f = camera.parameters[static_cast<std::size_t>(which)];
-      if (f > 0 && (width == 0 || (f > 0.05 * width && f < 50 * width))) continue;
-      absurd.push_back(c);
-      break;
-    }
-  }
-  report.add("absurd-focal", true, "lenses", absurd,
-             plural(absurd.size(), "lens has a focal length", "lenses have focal lengths") +
-                 " below 0, or far from the size of the images: not what a camera has; set it to "
-                 "about the width of the image, or hold a good one (--fix f)");
+    if (all[i] > kFarOff * median && !named[i]) far.push_back(i);
+  list.add("far-off", false, "observations", far,
+           plural(far.size(), "observation is", "observations are") + " off by more than " +
+               shown(kFarOff * median) + " px, " + shown(kFarOff) +
+               " times the median: probably wrong matches; take a robust loss (--loss "
+               "cauchy:auto) or leave them out (convert --max-error)");
 }
 
 }  // namespace
 
 std::vector<Finding> check(const Problem& problem) {
-  Report report;
-  check_parts(problem, report);
-  check_images(problem, report);
-  check_points(problem, report);
-  check_rank(problem, report);
-  check_duplicates(problem, report);
-  check_residuals(problem, report);
-  check_focals(problem, report);
-  std::stable_sort(report.findings.begin(), report.findings.end(),
+  FindingList list;
+  check_parts(problem, list);
+  check_images(problem, list);
+  check_points(problem, list);
+  check_rank(problem, list);
+  check_duplicates(problem, list);
+  const MeasuredReaches measured = measured_reaches(problem);
+  Named named(problem.num_observations(), false);
+  check_measurements(measured.absurd, list, named);
+  check_planes(problem, list, named);
+  check_residuals(problem, list, named);
+  check_lenses(problem, measured.reaches, list);
+  std::stable_sort(list.findings.begin(), list.findings.end(),
                    [](const Finding& a, const Finding& b) { return a.grave > b.grave; });
-  return std::move(report.findings);
+  return std::move(list.findings);
 }
 
 }  // namespace sheaf

@@ -10,6 +10,7 @@
 #include "inspect/clean.h"
 #include "io/colmap.h"
 #include "io/models.h"
+#include "sheaf/io.h"
 #include "sheaf/scene.h"
 
 namespace sheaf {
@@ -151,6 +152,74 @@ TEST(Clean, LeavesOutByErrorDepthAngleAndTrack) {
   cleaned = p;
   EXPECT_EQ(clean(cleaned, {}).observations, 0u);
   EXPECT_TRUE(same_state(cleaned, p));
+}
+
+/// Where the file names one observation without a pixel, the check does, under one code and no
+/// other, and says what helps.
+TEST(Check, FindsPointsInPlanesAndAtCentres) {
+  const struct {
+    const char *file, *code;
+    std::uint64_t observation;
+  } cases[] = {{"z-zero", "camera-plane", 176},
+               {"point-at-centre", "camera-centre", 15},
+               {"point-at-origin", "camera-centre", 0}};
+  for (const auto& [file, code, observation] : cases) {
+    const Problem p = read(std::string("tests/data/") + file + ".txt").value();
+    for (const Finding& finding : check(p)) {
+      const bool names =
+          std::find(finding.first.begin(), finding.first.end(), observation) != finding.first.end();
+      EXPECT_EQ(names && finding.of == "observations", finding.code == code) << finding.words;
+    }
+    const Finding finding = only(p, code);
+    EXPECT_EQ(finding.first, (std::vector<std::uint64_t>{observation}));
+    EXPECT_TRUE(finding.grave);
+    EXPECT_NE(finding.words.find("--drop-behind"), std::string::npos);
+    EXPECT_NE(finding.words.find("--cheirality hold-out"), std::string::npos);
+    Problem cleaned = p;
+    clean(cleaned, {.behind = true});
+    EXPECT_FALSE(codes(cleaned).contains(code));
+  }
+}
+
+TEST(Check, FindsAbsurdMeasurements) {
+  for (const double x : {1e100, -1e100, 1e200, 2000.0}) {
+    Problem p = good();
+    p.observation_xy[2 * 100] = x;
+    EXPECT_EQ(only(p, "absurd-measurements").first, (std::vector<std::uint64_t>{100})) << x;
+    EXPECT_EQ(codes(p), (std::set<std::string>{"absurd-measurements"}));
+    clean(p, {.max_error_px = 100});
+    EXPECT_TRUE(codes(p).empty());
+  }
+  Problem inside = good();
+  inside.observation_xy[2 * 100] = 1000;  // wrong, but not absurd
+  EXPECT_EQ(codes(inside), (std::set<std::string>{"far-off"}));
+}
+
+/// Behind, in the plane and at the centre: each observation is counted once.
+TEST(Clean, LeavesOutWhatHasNoPixel) {
+  Problem p = read("tests/data/z-zero.txt").value();
+  CleanRecord record = clean(p, {.behind = true});
+  EXPECT_EQ(record.in_plane, (std::vector<std::uint64_t>{176}));
+  EXPECT_TRUE(record.behind.empty() && record.at_centre.empty());
+  EXPECT_EQ(p.num_observations(), 176u);
+  EXPECT_TRUE(evaluate(p).not_finite.empty());
+
+  p = read("tests/data/point-at-centre.txt").value();
+  record = clean(p, {.behind = true});
+  EXPECT_EQ(record.at_centre, (std::vector<std::uint64_t>{15}));
+  EXPECT_EQ(record.behind, (std::vector<std::uint64_t>{14}));
+  EXPECT_EQ(record.observations, 2u);
+
+  p = good();
+  p.points[0] = 1e3, p.points[1] = 0, p.points[2] = -900;  // behind all
+  for (std::size_t k = 0; k < 3; ++k) p.points[3 + k] = 0;
+  p.poses[2].translation = {0, 0, 0};  // at point 1, and no other's plane
+  record = clean(p, {.behind = true, .min_track = 2});
+  EXPECT_EQ(record.at_centre, (std::vector<std::uint64_t>{81}));
+  EXPECT_TRUE(record.in_plane.empty());
+  EXPECT_FALSE(std::count(record.behind.begin(), record.behind.end(), 81u));
+  EXPECT_EQ(p.num_observations() + record.observations, 240u);
+  EXPECT_EQ(clean(p, {.behind = true}).observations, 0u);
 }
 
 /// Two images 90 degrees apart as a point sees them.
