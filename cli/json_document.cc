@@ -31,6 +31,7 @@ Json iteration_json(const Iteration& it) {
           {"scale_px", it.scale_px > 0 ? number(it.scale_px) : Json()},
           {"loss_floor", number(it.loss_floor)},
           {"linear_iterations", it.linear_iterations},
+          {"passes", it.passes},
           {"time_s", number(it.time_s)}};
 }
 
@@ -64,6 +65,28 @@ Json iterations_json(const Summary& summary) {
   Json iterations = Json::array();
   for (const Iteration& it : summary.iterations) iterations.push_back(iteration_json(it));
   return iterations;
+}
+
+Json changes_json(const Summary& summary) {
+  Json list = Json::array();
+  for (const SolverChange& change : summary.solver_changes)
+    list.push_back({{"after_step", change.after_step},
+                    {"iterations", number(change.iterations)},
+                    {"from", change.from},
+                    {"to", change.to}});
+  return list;
+}
+
+Json recoveries_json(const Summary& summary) {
+  Json list = Json::array();
+  for (const Recovery& r : summary.recoveries)
+    list.push_back({{"after_step", r.after_step},
+                    {"passes", r.passes},
+                    {"taken", r.taken},
+                    {"from_start", r.from_start},
+                    {"cost_before", number(r.cost_before)},
+                    {"cost_after", number(r.cost_after)}});
+  return list;
 }
 
 Json loss_json(const Summary& s) {
@@ -128,33 +151,38 @@ Json scene_options_json(const SceneOptions& o) {
 }
 
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
-  return {{"version", SHEAF_VERSION},
-          {"input", record.input},
-          {"options", record.options},
-          {"solver", {{"name", s.solver}, {"reason", s.solver_reason}}},
-          {"precision", s.precision},
-          {"simd", s.simd},
-          {"threads", s.threads},
-          {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_resident_bytes()}}},
-          {"initial_cost", number(s.initial_cost)},
-          {"final_cost", number(s.final_cost)},
-          {"loss", loss_json(s)},
-          {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
-          {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
-          {"iterations", iterations_json(s)},
-          {"time",
-           {{"read_s", record.read_s},
-            {"setup_s", s.setup_s},
-            {"solve_s", s.solve_s},
-            {"cpu_s", record.cpu_s},
-            {"write_s", record.write_s},
-            {"total_s", record.total_s}}},
-          {"plain_cost",
-           {{"before", number(record.before.cost)}, {"after", number(record.after.cost)}}},
-          {"behind_camera",
-           {{"before", observations_json(record.before.behind, problem)},
-            {"after", observations_json(record.after.behind, problem)}}},
-          {"rejected_observations", observations_json(s.rejected_observations, problem)}};
+  return {
+      {"version", SHEAF_VERSION},
+      {"input", record.input},
+      {"options", record.options},
+      {"solver", {{"name", s.solver}, {"reason", s.solver_reason}, {"changes", changes_json(s)}}},
+      {"points", {{"name", s.points}, {"reason", s.points_reason}}},
+      {"precision", s.precision},
+      {"simd", s.simd},
+      {"threads", s.threads},
+      {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_resident_bytes()}}},
+      {"initial_cost", number(s.initial_cost)},
+      {"final_cost", number(s.final_cost)},
+      {"loss", loss_json(s)},
+      {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
+      {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
+      {"iterations", iterations_json(s)},
+      {"recoveries", recoveries_json(s)},
+      {"time",
+       {{"read_s", record.read_s},
+        {"setup_s", s.setup_s},
+        {"solve_s", s.solve_s},
+        {"cpu_s", record.cpu_s},
+        {"write_s", record.write_s},
+        {"total_s", record.total_s}}},
+      {"plain_cost",
+       {{"before", number(record.before.cost)},
+        {"after", number(record.after.cost)},
+        {"agrees", record.agrees}}},
+      {"behind_camera",
+       {{"before", observations_json(record.before.behind, problem)},
+        {"after", observations_json(record.after.behind, problem)}}},
+      {"rejected_observations", observations_json(s.rejected_observations, problem)}};
 }
 
 void write_json(const Json& document, const std::string& path) {

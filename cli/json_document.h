@@ -31,12 +31,15 @@ Json scene_options_json(const SceneOptions& options);
 /// Key and value of each option that a verb has of its own.
 Json options_json(const std::vector<BoundOption>& options);
 Json iterations_json(const Summary& summary);
+Json changes_json(const Summary& summary);
+Json recoveries_json(const Summary& summary);
 Json loss_json(const Summary& summary);
 
 /// What the JSON of a solve is made of.
 struct SolveRecord {
   Json input, options;
   Evaluation before, after;  ///< by independent code
+  bool agrees = true;        ///< the solver's final cost with it
   double read_s = 0, cpu_s = 0, write_s = 0, total_s = 0;
 };
 Json solve_json(const SolveRecord& record, const Summary& summary, const Problem& problem);

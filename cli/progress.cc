@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
+#include <string>
 
 namespace sheaf {
 
@@ -20,12 +22,28 @@ void Progress::report_plan(const Summary& summary) {
              summary.solver_reason, 1e-6 * static_cast<double>(summary.forecast_bytes));
 }
 
+namespace {
+
+/// A number, or a dash where there is none.
+std::string shown(double value, const char* format) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
+}
+
+}  // namespace
+
 void Progress::report(const Iteration& it) {
-  const double change = it.index == 0 ? 0 : it.trial_cost - it.start_cost;
+  const std::string change = shown(it.trial_cost - it.start_cost, "{:.3e}");
+  const std::string gain = std::isfinite(it.trial_cost) ? shown(it.gain_ratio, "{:.3f}") : "-";
   if (style_ != Style::none && it.round != round_)
     fmt::print(stderr, "round {}: the loss has another scale, the cost is {:.9e}\n", it.round + 1,
                it.start_cost);
   round_ = it.round;
+  if (style_ != Style::none && it.passes > 0) {
+    fmt::print(stderr,
+               "{}: steps went wrong; {} passes of resection and intersection led to cost {:.9e}\n",
+               it.index, it.passes, it.cost);
+    return;
+  }
   if (style_ == Style::table) {
     if (it.index == 0)
       fmt::print(stderr, "{:>5} {:>16} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "iter", "cost", "change",
@@ -34,19 +52,19 @@ void Progress::report(const Iteration& it) {
       fmt::print(stderr, "{:>5} {:>16.9e} {:>11} {:>8} {:>9} {:>9.2e} {:>9.3f}\n", 0, it.cost, "",
                  "", "", it.gradient_max, it.time_s);
     else
-      fmt::print(stderr, "{:>5} {:>16.9e} {:>11.3e} {:>8.3f} {:>9.2e} {:>9.2e} {:>9.3f}{}\n",
-                 it.index, it.cost, change, it.gain_ratio, it.damping, it.gradient_max, it.time_s,
+      fmt::print(stderr, "{:>5} {:>16.9e} {:>11} {:>8} {:>9.2e} {:>9.2e} {:>9.3f}{}\n", it.index,
+                 it.cost, change, gain, it.damping, it.gradient_max, it.time_s,
                  it.accepted ? "" : "  rejected");
     std::fflush(stderr);
   } else if (style_ == Style::lines) {
     if (it.index == 0)
-      fmt::print(stderr, "start: cost {:.9e}\n", it.cost);
+      fmt::print(stderr, "start: cost {}\n", shown(it.cost, "{:.9e}"));
     else
       fmt::print(stderr,
-                 "iteration {}: cost {:.9e}, change {:.3e}{}, gain {:.3f}, damping {:.2e}, "
+                 "iteration {}: cost {:.9e}, change {}{}, gain {}, damping {:.2e}, "
                  "gradient {:.2e}, {:.3f} s\n",
-                 it.index, it.cost, change, it.accepted ? "" : " (rejected)", it.gain_ratio,
-                 it.damping, it.gradient_max, it.time_s);
+                 it.index, it.cost, change, it.accepted ? "" : " (rejected)", gain, it.damping,
+                 it.gradient_max, it.time_s);
   }
 }
 

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "exit_code.h"
 #include "interrupt.h"
@@ -13,6 +16,7 @@
 #include "options/solve_options.h"
 #include "outputs.h"
 #include "progress.h"
+#include "scene/subset.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -63,6 +67,25 @@ std::vector<std::string> write_results(const Arguments& arguments, Problem befor
   return written;
 }
 
+// Whether the solver's final cost is what independent code has for the state, but for rounding.
+// Observations that were left out count in neither.
+bool agrees(const Summary& summary, const Evaluation& after, const Problem& problem) {
+  constexpr double kRounding = 1e-9;
+  // Where points lie in a camera's plane but for rounding, no two codes agree.
+  constexpr double kAbsurd_px = 1e8;
+  if (!summary.usable() || summary.final_rms_px > kAbsurd_px) return true;
+  double cost = after.cost;
+  if (!summary.rejected_observations.empty()) {
+    Problem kept = problem;
+    kept.metadata = nullptr;
+    std::vector<bool> keep(problem.num_observations(), true);
+    for (std::uint64_t i : summary.rejected_observations) keep[i] = false;
+    keep_observations(kept, keep, 1);
+    cost = evaluate(kept).cost;
+  }
+  return std::abs(cost - summary.final_plain_cost) <= kRounding * (cost + 1e-20);
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
@@ -106,8 +129,13 @@ int run(Arguments& arguments) {
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   fmt::print("{}", summary_text(summary, input.read_s));
   fmt::print("{}", held);
+  record.after = evaluate(problem);
+  record.agrees = agrees(summary, record.after, problem);
+  if (!record.agrees)
+    fmt::print(
+        "wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
+        record.after.cost, summary.final_plain_cost);
   if (wants_json) {
-    record.after = evaluate(problem);
     record.total_s = total.seconds();
     write_json(solve_json(record, summary, problem), arguments.common.json);
     written.push_back(arguments.common.json);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace sheaf {
 
@@ -17,6 +18,11 @@ std::string counts_text(const Problem& problem) {
 }
 
 namespace {
+
+/// A number, or words where it is none.
+std::string number_text(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}e}", value, digits) : "not finite";
+}
 
 /// "cauchy, scale 0.932 px (sigma 3.51, 0.52, 0.366 px in 3 rounds)"
 std::string loss_text(const Summary& s) {
@@ -38,14 +44,23 @@ std::string summary_text(const Summary& s, double read_s) {
   const auto rejected = std::count_if(s.iterations.begin(), s.iterations.end(),
                                       [](const Iteration& it) { return !it.accepted; });
   std::string out;
-  out += fmt::format("cost        {:.9e} -> {:.9e}\n", s.initial_cost, s.final_cost);
+  out += fmt::format("cost        {} -> {}\n", number_text(s.initial_cost, 9),
+                     number_text(s.final_cost, 9));
   if (s.loss != LossKind::none) {
     out += fmt::format("loss        {}\n", loss_text(s));
-    out += fmt::format("plain cost  {:.9e} -> {:.9e}\n", s.initial_plain_cost, s.final_plain_cost);
+    out += fmt::format("plain cost  {} -> {}\n", number_text(s.initial_plain_cost, 9),
+                       number_text(s.final_plain_cost, 9));
   }
-  out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
+  if (std::isfinite(s.initial_rms_px) && std::isfinite(s.final_rms_px))
+    out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
   out += fmt::format("iterations  {}{}\n", steps,
                      rejected > 0 ? fmt::format(" ({} rejected)", rejected) : "");
+  for (const Recovery& r : s.recoveries)
+    out += fmt::format(
+        "recovery    after step {}: {} passes of resection and intersection, {}, cost {:.6g} -> "
+        "{:.6g}{}\n",
+        r.after_step, r.passes, r.from_start ? "from the start" : "from there", r.cost_before,
+        r.cost_after, r.taken ? "" : "; not taken");
   out += fmt::format("stopped     {}\n", s.words);
   out += fmt::format("time        read {:.3f} s, set-up {:.3f} s, solve {:.3f} s\n", read_s,
                      s.setup_s, s.solve_s);

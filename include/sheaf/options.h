@@ -24,6 +24,7 @@ enum class Cheirality {
 
 /// In which coordinates a point steps. It is stored as X, Y, Z in any case.
 enum class PointParametrisation {
+  automatic,      ///< inverse depth where many points are seen under small angles, else X, Y, Z
   xyz,            ///< X, Y, Z
   homogeneous,    ///< a unit 4-vector about the middle of the cameras: passes through infinity
   inverse_depth,  ///< bearing and inverse depth from the first image that sees it: likewise
@@ -55,7 +56,7 @@ struct SolveOptions {
   Loss loss{};                                                    ///< none, or as in `Huber{1.0}`
   int threads = 0;  ///< 0: all; the result does not depend on it
   Cheirality cheirality = Cheirality::formula;
-  PointParametrisation points = PointParametrisation::xyz;
+  PointParametrisation points = PointParametrisation::automatic;
   Fixed fixed{};
   CameraSolverKind solver = CameraSolverKind::automatic;
   Precision precision = Precision::automatic;
@@ -70,9 +71,13 @@ struct SolveOptions {
   /// have stepped (Ceres calls them inner iterations); 0: none, the plain Levenberg-Marquardt step.
   /// Under a loss: a Levenberg-Marquardt of each point, three tries for one of these.
   int inner_iterations = 3;
+  /// How often at most an early step that went wrong is answered by resecting every image and
+  /// intersecting every point by itself (docs/solver.md); 0: never.
+  int recoveries = 3;
   Simd simd = Simd::best;  ///< for tests and measurements
 
   /// Called once the solver is chosen and before it allocates: solver, reason and forecast are set.
+  /// Called again should another one go on (Summary::solver_changes).
   std::function<void(const Summary&)> on_plan{};
   /// Called after the start was evaluated (index 0) and after every step; return false to stop.
   std::function<bool(const Iteration&)> on_iteration{};

@@ -34,6 +34,9 @@ struct Iteration {
   /// (docs/math.md, section 12); 1: the weight alone.
   double loss_floor = 1;
   int linear_iterations = 0;
+  /// 0: a step. Else it is no step: the state was replaced by one that so many passes of resection
+  /// and intersection found (Summary::recoveries).
+  int passes = 0;
   double time_s = 0;  ///< since set-up ended
 };
 
@@ -45,6 +48,9 @@ enum class Termination {
   time_limit,
   stopped,         ///< by the callback or the stop token
   no_usable_step,  ///< no step could be computed or accepted from the start
+  nothing_free,    ///< nothing was free to move
+  zero_weights,    ///< under the loss every observation has the weight 0
+  drowned,  ///< one observation's cost is so large that its rounding hides what others could gain
 };
 
 /// "cost_converged", ... : stable, for JSON.
@@ -60,6 +66,25 @@ struct LossRound {
   int steps = 0;  ///< tried, rejected ones included
 };
 
+/// An attempt to get out of where early steps went wrong: images were resected and points
+/// intersected in turn. Each pass over all images or all points counts as an iteration.
+struct Recovery {
+  int after_step = 0;  ///< index of the step that was rejected
+  int passes = 0;      ///< that were made
+  bool taken = false;  ///< whether the state found was so much better that it was gone on from
+  bool from_start =
+      false;  ///< whether the best passes set out from the start, not the state reached
+  double cost_before = 0;  ///< of the state reached, by the scale of the round
+  double cost_after = 0;   ///< of the best one found
+};
+
+/// The camera solver was chosen anew, by the conjugate gradients that steps really took.
+struct SolverChange {
+  int after_step = 0;
+  double iterations = 0;  ///< of conjugate gradients, the mean of the last steps
+  std::string from, to;   ///< as Summary::solver
+};
+
 /// What happened. Costs are 1/2 sum rho(|r|^2) in px^2; without a loss rho(s) = s.
 struct Summary {
   double initial_cost = 0;        ///< with the first round's scale
@@ -71,12 +96,16 @@ struct Summary {
   Termination termination = Termination::no_usable_step;
   std::string words;  ///< the reason for stopping, as a sentence
   std::vector<Iteration> iterations;
+  std::vector<Recovery> recoveries;
   LossKind loss = LossKind::none;
   std::vector<LossRound> rounds;  ///< without a loss one
   double final_sigma_px = 0;      ///< estimated at the end, for an automatic scale
 
-  std::string solver;                ///< "dense", ...
-  std::string solver_reason;         ///< one line: why this one
+  std::string solver;         ///< "dense", ...; the last one
+  std::string solver_reason;  ///< one line: why this one
+  std::vector<SolverChange> solver_changes;
+  std::string points = "xyz";        ///< the coordinates in which points stepped
+  std::string points_reason;         ///< one line: why these
   std::string precision = "double";  ///< or "mixed": float inside the linear solver
   std::string simd;                  ///< instruction set used
   int threads = 1;
@@ -89,7 +118,9 @@ struct Summary {
   std::vector<std::uint64_t> behind_camera_after;
   std::vector<std::uint64_t> rejected_observations;  ///< left out (Cheirality::hold_out)
 
-  bool usable() const { return termination != Termination::no_usable_step; }
+  bool usable() const {
+    return termination != Termination::no_usable_step && termination != Termination::zero_weights;
+  }
 };
 
 /// What a photometric refinement did. Costs are 1/2 sum rho in grey levels squared, and where

@@ -32,7 +32,7 @@ struct BalLens {
     by_parameter<1>(k, 1, n * x, n * y, out);
     by_parameter<1>(k, 2, n * n * x, n * n * y, out);
   }
-  static bool sees(const double*, const double* P) { return !(P[2] > 0); }
+  static bool sees(const double*, const double* P) { return P[2] < 0; }
 };
 
 }  // namespace SHEAF_LENS_NAMESPACE

@@ -28,7 +28,10 @@ Table model_fields() {
            .placeholder = "RULE",
            .help = "observations behind their camera"}),
       F::choice(&SolveOptions::points,
-                {{PointParametrisation::xyz, "xyz"},
+                {{PointParametrisation::automatic, "auto",
+                  "inverse depth, not through infinity, where many points have little parallax; "
+                  "else xyz"},
+                 {PointParametrisation::xyz, "xyz"},
                  {PointParametrisation::homogeneous, "homogeneous",
                   "a unit 4-vector; passes through infinity"},
                  {PointParametrisation::inverse_depth, "inverse-depth",
@@ -68,6 +71,13 @@ Table solver_fields() {
                 .help = "at most so many Gauss-Newton steps of each point by itself in every step, "
                         "once the cameras have stepped; under a loss, tries of a "
                         "Levenberg-Marquardt, three for one of these; 0: none"}),
+      F::whole(&SolveOptions::recoveries,
+               {.name = "recoveries",
+                .placeholder = "N",
+                .range = from(0),
+                .help = "so often at most, where an early step goes wrong, resect every image and "
+                        "intersect every point by itself, and go on from there if that is better; "
+                        "0: never"}),
       F::choice(&SolveOptions::simd,
                 {{Simd::best, "best"},
                  {Simd::scalar, "scalar"},

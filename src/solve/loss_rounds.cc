@@ -42,18 +42,26 @@ double estimate_sigma(System& system) {
 class Rounds {
  public:
   Rounds(System& system, const SolveOptions& options, const Stopwatch& since_start,
-         Summary& summary)
-      : system_(system), options_(options), since_start_(since_start), summary_(summary) {}
+         Summary& summary, std::optional<LoopHistory>* history, const Hooks* hooks)
+      : system_(system),
+        options_(options),
+        since_start_(since_start),
+        summary_(summary),
+        history_(history),
+        hooks_(hooks) {}
+  bool restarts() const { return restarts_; }
 
   void run() {
     begin();
     for (int returns = 0;; ++returns) {
       while (provisional_) {
         descend(kOneStep);
+        if (restarts_) return;
         if (!converged()) return finish();
         choose_next();
       }
       descend(options_.tolerance);
+      if (restarts_) return;
       if (!converged() || !is_automatic() || returns == kMostReturns) return finish();
       const LossRound there = target();
       if (std::abs(there.scale_px - now().scale_px) <= kStale * now().scale_px) return finish();
@@ -80,6 +88,9 @@ class Rounds {
   }
 
   void begin() {
+    if (*history_) return;  // another solver goes on, with the scale that was the last
+    // Without a loss there is one round, whatever the attempts.
+    if (options_.loss.kind == LossKind::none && !summary_.rounds.empty()) return;
     summary_.rounds.push_back(target());
     provisional_ = is_automatic();
     if (!options_.loss.graduated) return;
@@ -98,13 +109,13 @@ class Rounds {
     provisional_ = narrows || (is_automatic() &&
                                (last_decrease() >= kSettledDecrease || change >= kSettledChange));
     if (change > (is_automatic() ? kNear : 0)) return rescale(next);
-    if (history_) history_->small_decreases = 0;  // with one step, any decrease was small
+    if (*history_) (*history_)->small_decreases = 0;  // with one step, any decrease was small
   }
 
   void rescale(const LossRound& next) {
     const double change = std::abs(next.scale_px - now().scale_px) / now().scale_px;
     summary_.rounds.push_back(next);
-    if (history_) history_->rescale(change <= kAlike);
+    if (*history_) (*history_)->rescale(change <= kAlike);
   }
 
   /// Relative, of the cost by the last step that was taken with the present scale; 0: none was.
@@ -128,8 +139,8 @@ class Rounds {
     SolveOptions options = options_;
     options.tolerance = tolerance;
     const std::size_t before = summary_.iterations.size();
-    minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_, summary_,
-             std::numeric_limits<double>::infinity(), &history_);
+    restarts_ = minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_,
+                         summary_, std::numeric_limits<double>::infinity(), history_, hooks_);
     const std::size_t after = summary_.iterations.size();
     if (now().steps == 0)
       now().initial_cost =
@@ -143,14 +154,19 @@ class Rounds {
   const Stopwatch& since_start_;
   Summary& summary_;
   bool provisional_ = false;  ///< the scale is still on its way
-  std::optional<LoopHistory> history_;
+  std::optional<LoopHistory>* const history_;
+  const Hooks* hooks_;
+  bool restarts_ = false;
 };
 
 }  // namespace
 
-void minimize_in_rounds(System& system, const SolveOptions& options, const Stopwatch& since_start,
-                        Summary& summary) {
-  Rounds(system, options, since_start, summary).run();
+bool minimize_in_rounds(System& system, const SolveOptions& options, const Stopwatch& since_start,
+                        Summary& summary, std::optional<LoopHistory>* history, const Hooks* hooks) {
+  std::optional<LoopHistory> own;
+  Rounds rounds(system, options, since_start, summary, history != nullptr ? history : &own, hooks);
+  rounds.run();
+  return rounds.restarts();
 }
 
 }  // namespace sheaf

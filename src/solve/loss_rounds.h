@@ -5,6 +5,7 @@
 #include "platform/clock.h"
 #include "sheaf/options.h"
 #include "sheaf/solve.h"
+#include "solve/trust_region.h"
 #include "systems/system.h"
 
 namespace sheaf {
@@ -14,7 +15,10 @@ namespace sheaf {
 /// and the steps go on to the end. Should the residuals there ask for another by more than 5 %, it
 /// moves on from there. A graduated loss starts with a scale that holds almost all residuals in its
 /// convex part. No scale falls to less than half in a step. Fills the summary's rounds too.
-void minimize_in_rounds(System& system, const SolveOptions& options, const Stopwatch& since_start,
-                        Summary& summary);
+/// `history`: one that is set is gone on from, with the last round's scale, which must be final; it
+/// is left as the last step left it. `hooks`, and what is returned: as for minimize.
+bool minimize_in_rounds(System& system, const SolveOptions& options, const Stopwatch& since_start,
+                        Summary& summary, std::optional<LoopHistory>* history = nullptr,
+                        const Hooks* hooks = nullptr);
 
 }  // namespace sheaf

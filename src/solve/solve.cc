@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sheaf/solve.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,7 +14,9 @@
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "scene/behind.h"
+#include "solve/endings.h"
 #include "solve/loss_rounds.h"
+#include "solve/recovery.h"
 #include "solve/trust_region.h"
 #include "systems/build.h"
 
@@ -37,13 +41,34 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
                  std::to_string(problem.cameras.size()) + " cameras");
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (Result<void> fields = check_fields(options); !fields.ok()) return fields;
-  if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz)
+  if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz &&
+      options.points != PointParametrisation::automatic)
     return usage("the dogleg steps points by X, Y, Z: it takes no other parametrisation of points");
   return {};
 }
 
-void tell(const Choice& choice, const SolveOptions& options, const Kernels& kernels,
+double rms(double cost, std::size_t observations) {
+  return observations > 0 ? std::sqrt(2 * cost / static_cast<double>(observations)) : 0;
+}
+
+const char* to_string(PointParametrisation points) {
+  switch (points) {
+    case PointParametrisation::homogeneous:
+      return "homogeneous";
+    case PointParametrisation::inverse_depth:
+      return "inverse-depth";
+    case PointParametrisation::automatic:
+    case PointParametrisation::xyz:
+      break;
+  }
+  return "xyz";
+}
+
+void tell(const Build& build, const SolveOptions& options, const Kernels& kernels,
           const Threads& threads, Summary& summary) {
+  const Choice& choice = build.choice();
+  summary.points = to_string(build.points().points);
+  summary.points_reason = build.points().reason;
   summary.solver = to_string(choice.plan.kind);
   summary.solver_reason = choice.plan.reason;
   summary.precision = choice.plan.mixed ? "mixed" : "double";
@@ -52,6 +77,23 @@ void tell(const Choice& choice, const SolveOptions& options, const Kernels& kern
   summary.loss = options.loss.kind;
   summary.threads = threads.count();
   if (options.on_plan) options.on_plan(summary);
+}
+
+/// As it is asked for by name.
+CameraSolverKind solver_named(SolverKind kind) {
+  switch (kind) {
+    case SolverKind::blocks:
+      break;
+    case SolverKind::dense:
+      return CameraSolverKind::dense;
+    case SolverKind::sparse:
+      return CameraSolverKind::sparse;
+    case SolverKind::explicit_cg:
+      return CameraSolverKind::iterative_explicit;
+    case SolverKind::implicit_cg:
+      return CameraSolverKind::iterative_implicit;
+  }
+  return CameraSolverKind::automatic;
 }
 
 /// Observations to leave out: 1 for each.
@@ -65,38 +107,160 @@ std::vector<std::uint8_t> held_out(const Problem& problem, const SolveOptions& o
   return skip;
 }
 
-/// Builds a system of the problem, refines it and stores it; what went wrong, if anything.
-Result<void> refine(Problem& problem, SolveOptions options, const Kernels& kernels,
-                    const Stopwatch& clock, Summary& summary) {
-  Threads threads(options.threads);
-  const std::vector<std::uint8_t> skip = held_out(problem, options, threads, summary);
-  Result<Build> planned = Build::plan(problem, options, skip, kernels, threads);
-  if (!planned.ok()) return planned.error();
-  Build& build = planned.value();
-  tell(build.choice(), options, kernels, threads, summary);
-  bool behind_after = false;
-  {
-    if (build.lends()) summary.behind_camera_before = behind_camera(problem, threads);
-    std::optional<LentObservations> lent;
-    if (build.lends()) build.lend(problem, lent);
-    const std::unique_ptr<Home> home = build.make_home(problem);
-    if (!build.lends() && home->count_behind() > 0)
-      summary.behind_camera_before = behind_camera(problem, threads);
-    summary.setup_s = clock.seconds();
-    if (options.initial_damping == 0)
-      options.initial_damping = default_damping(problem.num_images());
-    minimize_in_rounds(*home, options, clock, summary);
-    build.store(*home, problem);
-    behind_after = home->count_behind() > 0;
+/// A solve of one problem: its attempts, each with a home of its own.
+class Attempts {
+ public:
+  Attempts(Problem& problem, const SolveOptions& options, const Kernels& kernels,
+           const Stopwatch& clock, Summary& summary)
+      : problem_(problem),
+        options_(options),
+        kernels_(kernels),
+        clock_(clock),
+        summary_(summary),
+        threads_(options.threads),
+        skip_(held_out(problem, options, threads_, summary)) {
+    if (options_.initial_damping == 0)
+      options_.initial_damping = default_damping(problem.num_images());
   }
-  summary.solve_s = clock.seconds() - summary.setup_s;
-  if (behind_after) summary.behind_camera_after = behind_camera(problem, threads);
-  return {};
-}
 
-double rms(double cost, std::size_t observations) {
-  return observations > 0 ? std::sqrt(2 * cost / static_cast<double>(observations)) : 0;
-}
+  Result<void> run() {
+    for (bool first = true;; first = false) {
+      const Result<void> done = attempt(first);
+      if (done.ok() && !better_) tell_ending();
+      if (!done.ok() || !better_) return done;
+      put(*better_, problem_);
+      better_.reset();
+    }
+  }
+
+ private:
+  /// Builds a system of the problem and refines it; stores it unless there is a better state to go
+  /// on from. What went wrong, if anything.
+  Result<void> attempt(bool first) {
+    Result<Build> planned = Build::plan(problem_, options_, skip_, kernels_, threads_);
+    if (!planned.ok()) return planned.error();
+    Build& build = planned.value();
+    if (first) tell(build, options_, kernels_, threads_, summary_);
+    bool behind_after = false;
+    {
+      if (build.lends()) summary_.behind_camera_before = behind_camera(problem_, threads_);
+      std::optional<LentObservations> lent;
+      if (build.lends()) build.lend(problem_, lent);
+      const std::unique_ptr<Home> home = build.make_home(problem_);
+      if (first && !build.lends() && home->count_behind() > 0)
+        summary_.behind_camera_before = behind_camera(problem_, threads_);
+      if (first) summary_.setup_s = clock_.seconds();
+      const Hooks hooks{[&] { return find_better(build, *home); },
+                        [&](double iterations) { return change_solver(build, *home, iterations); }};
+      if (minimize_in_rounds(*home, options_, clock_, summary_, &history_, &hooks)) {
+        if (!better_) better_ = std::move(reached_);  // the better state was none
+        return {};
+      }
+      build.store(*home, problem_);
+      behind_after = home->count_behind() > 0;
+    }
+    summary_.solve_s = clock_.seconds() - summary_.setup_s;
+    if (behind_after) summary_.behind_camera_after = behind_camera(problem_, threads_);
+    return {};
+  }
+
+  void tell_ending() {
+    const auto ending = ending_of(problem_, skip_, options_, summary_, threads_);
+    if (!ending) return;
+    summary_.termination = ending->termination;
+    summary_.words = ending->words;
+  }
+
+  bool out_of_time() const {
+    return options_.stop.stop_requested() || clock_.seconds() >= options_.time_limit_s;
+  }
+
+  /// Whether there is a better state than the home's, or none that could be seen to be.
+  /// Observations that are lent are not at hand.
+  Recourse find_better(const Build& build, const Home& home) {
+    const int left = options_.max_iterations - steps_of(summary_);
+    // A state that fits to a twentieth of a pixel is not far from anything.
+    const std::size_t used = problem_.num_observations() - summary_.rejected_observations.size();
+    const bool near = rms(summary_.iterations.back().cost, used) < 0.05;
+    if (options_.recoveries == 0 || build.lends() || left <= 0 || near) return Recourse::none;
+    --options_.recoveries;
+    const Estimate start = estimate_of(problem_);
+    build.store(home, problem_);
+    const Estimate reached = estimate_of(problem_);
+    put(start, problem_);
+    const RecoveryRequest request{
+        problem_,       skip_,
+        options_.fixed, {options_.loss.kind, summary_.rounds.back().scale_px},
+        left,           [this] { return out_of_time(); }};
+    Recovered found = recover(request, start, reached, threads_);
+    if (found.found && options_.cheirality != Cheirality::formula &&
+        puts_behind(start, reached, found.state))
+      found.found = found.record.taken = false;
+    found.record.after_step = summary_.iterations.back().index;
+    summary_.recoveries.push_back(found.record);
+    if (found.found)
+      better_ = std::move(found.state);
+    else
+      options_.recoveries = 0;
+    if (found.found) {
+      reached_ = reached;
+      history_.reset();
+      return Recourse::restart;
+    }
+    put(reached, problem_);
+    const bool drowned = drowning_observation(problem_, skip_, request.loss, threads_).has_value();
+    put(start, problem_);
+    return drowned ? Recourse::end : Recourse::none;
+  }
+
+  /// Whether the camera solver that is cheaper by what conjugate gradients really take goes on.
+  bool change_solver(const Build& build, const Home& home, double iterations) {
+    const Choice& choice = build.choice();
+    if (choice.counts == nullptr) return false;
+    // Products in double cost about twice those that the counts assume.
+    const double counted = iterations * (choice.plan.mixed ? 1 : 2);
+    const std::optional<Plan> plan = better_plan(*choice.counts, choice.plan.kind, counted);
+    if (!plan) return false;
+    const std::string to = to_string(plan->kind);
+    summary_.solver_changes.push_back(
+        {summary_.iterations.back().index, iterations, summary_.solver, to});
+    summary_.solver = to;
+    summary_.solver_reason = "after conjugate gradients of " +
+                             std::to_string(static_cast<int>(iterations + 0.5)) +
+                             " iterations a step: " + plan->reason;
+    if (options_.on_plan) options_.on_plan(summary_);
+    options_.solver = solver_named(plan->kind);
+    const Estimate start = estimate_of(problem_);
+    build.store(home, problem_);
+    better_ = estimate_of(problem_);
+    put(start, problem_);
+    return true;
+  }
+
+  /// Whether an observation is behind its camera that was not so in the state that was reached.
+  bool puts_behind(const Estimate& start, const Estimate& reached, const Estimate& found) {
+    const auto behind = [&](const Estimate& state) {
+      put(state, problem_);
+      std::vector<std::uint64_t> all = behind_camera(problem_, threads_);
+      std::erase_if(all, [&](std::uint64_t i) { return !skip_.empty() && skip_[i]; });
+      return all;
+    };
+    const auto before = behind(reached), after = behind(found);
+    put(start, problem_);
+    return !std::includes(before.begin(), before.end(), after.begin(), after.end());
+  }
+
+  Problem& problem_;
+  SolveOptions options_;
+  const Kernels& kernels_;
+  const Stopwatch& clock_;
+  Summary& summary_;
+  Threads threads_;
+  const std::vector<std::uint8_t> skip_;
+  std::optional<Estimate> better_;  ///< to go on from
+  Estimate reached_;                ///< before that was found
+  std::optional<LoopHistory> history_;
+};
 
 }  // namespace
 
@@ -108,7 +272,8 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   try {
-    const Result<void> done = refine(problem, options, *kernels.value(), clock, summary);
+    Attempts attempts(problem, options, *kernels.value(), clock, summary);
+    const Result<void> done = attempts.run();
     if (!done.ok()) return done.error();
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for this problem");
@@ -139,6 +304,12 @@ const char* to_string(Termination termination) {
       return "stopped";
     case Termination::no_usable_step:
       return "no_usable_step";
+    case Termination::nothing_free:
+      return "nothing_free";
+    case Termination::zero_weights:
+      return "zero_weights";
+    case Termination::drowned:
+      return "drowned";
   }
   return "no_usable_step";
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "solve/step_control.h"
 
@@ -25,6 +26,14 @@ constexpr double kPreciseBelow = 1e-5;
 constexpr double kSmallestGain = 1e-3;
 /// Tried on six scenes: 4 and 8 end sooner on some and later on others.
 constexpr double kLongest = 2;
+/// A step is early among the first kEarly, and the state is far while steps take more than
+/// kStillFar of the cost.
+constexpr std::size_t kEarly = 15;
+constexpr double kStillFar = 0.1;
+/// A dogleg begins with steps that are too long, and a shorter one costs it little.
+constexpr int kDoglegPatience = 3;
+/// Steps whose conjugate gradients say what the next ones will take.
+constexpr std::size_t kRecent = 4;
 /// A step that changes no block by more than this (relative) is rounding.
 constexpr double kRounding = 1e-14;
 
@@ -41,6 +50,9 @@ class Loop {
         control_(options.trust_region,
                  options.initial_damping > 0 ? options.initial_damping : default_damping(1),
                  loss.kind != LossKind::none) {}
+
+  bool restarts() const { return restarts_; }
+  void may_ask(const Hooks* hooks) { hooks_ = hooks; }
 
   /// Goes on from what is there, and leaves what there is after each step.
   void keep(std::optional<LoopHistory>* history) {
@@ -87,9 +99,11 @@ class Loop {
   void begin(const Step& step) {
     begun_ = true;
     // A round that goes on keeps its cost: another order of sums would change its last bits.
-    const bool goes_on = !summary_.rounds.empty() && summary_.rounds.back().steps > 0;
+    const bool recovered = is_recovered();
+    const bool goes_on = !recovered && !summary_.rounds.empty() && summary_.rounds.back().steps > 0;
     cost_ = goes_on ? summary_.final_cost : step.cost;
     plain_cost_ = goes_on ? summary_.final_plain_cost : step.plain_cost;
+    if (recovered) return tell_recovery(step);
     if (!summary_.iterations.empty()) return;
     summary_.initial_cost = cost_;
     summary_.initial_plain_cost = plain_cost_;
@@ -141,16 +155,30 @@ class Loop {
     cost_ = it.cost = trial.cost;
     plain_cost_ = trial.plain_cost;
     it.accepted = true;
+    rejected_in_a_row_ = 0;
     control_.accepted(it.gain_ratio, trial, it.linear_iterations, decrease);
     stretch_ = stretch_ > 1 ? 1 : stretch_after(it.gain_ratio);
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
+    note_iterations(it.linear_iterations);
     const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
     small_decreases_ = small ? small_decreases_ + 1 : 0;
     publish(it);
     if (small_decreases_ >= (std::isinf(options_.tolerance) ? 1 : 2))
       end(Termination::cost_converged,
           "converged: the cost fell by less than the tolerance, relatively, twice in a row");
+    if (!done_ && hooks_ != nullptr && recent_iterations_ > 0 &&
+        hooks_->change_solver(recent_iterations_))
+      restarts_ = done_ = true;
+  }
+
+  /// The mean of the last kRecent steps, once there are so many.
+  void note_iterations(int iterations) {
+    last_iterations_.push_back(iterations);
+    if (last_iterations_.size() > kRecent) last_iterations_.erase(last_iterations_.begin());
+    int sum = 0;
+    for (int count : last_iterations_) sum += count;
+    recent_iterations_ = last_iterations_.size() < kRecent ? 0 : static_cast<double>(sum) / kRecent;
   }
 
   /// Where a loss that forgets is concave the model lies too high however low its floor, and the
@@ -177,6 +205,14 @@ class Loop {
     else
       control_.rejected(trial);
     publish(it);
+    ++rejected_in_a_row_;
+    const Recourse recourse = hooks_ != nullptr && doubtful() ? hooks_->recover() : Recourse::none;
+    if (recourse == Recourse::restart) {
+      restarts_ = done_ = true;
+      return;
+    }
+    if (recourse == Recourse::end)
+      return end(Termination::step_converged, "stopped: no gain could be seen");
     const bool exhausted = control_.exhausted();
     if (exhausted && !any_finite_trial_ && !moved())
       return end(Termination::no_usable_step, "no step led to a finite cost, however short");
@@ -191,6 +227,39 @@ class Loop {
           "stopped: no step from here leads to a finite cost, however short");
   }
 
+  /// A step was rejected that came early, while each took much of the cost: the state is far from
+  /// where a linear model is good. From good starts that does not happen.
+  bool doubtful() const {
+    const int patience = control_.dogleg() ? kDoglegPatience : 1;
+    return rejected_in_a_row_ >= patience &&
+           summary_.iterations.size() - 1 - attempt_begin_ <= kEarly && last_decrease_ > kStillFar;
+  }
+
+  /// Another attempt: where it goes on from stands in the list of steps.
+  void tell_recovery(const Step& step) {
+    // Where rounding decides, the solver's own cost may be another than the one it was chosen by.
+    constexpr double kSame = 1e-9;
+    if (!(cost_ <= (1 + kSame) * summary_.final_cost)) {
+      cost_ = summary_.final_cost;
+      plain_cost_ = summary_.final_plain_cost;
+      summary_.recoveries.back().taken = false;
+      restarts_ = done_ = true;
+      return;
+    }
+    attempt_begin_ = summary_.iterations.size();
+    Iteration it = record(step, std::nullopt);
+    it.start_cost = summary_.final_cost;
+    it.cost = it.trial_cost = cost_;
+    it.accepted = true;
+    it.passes = summary_.recoveries.back().passes;
+    publish(it);
+  }
+  bool is_recovered() const {
+    return !summary_.recoveries.empty() && summary_.recoveries.back().taken &&
+           summary_.recoveries.back().after_step + 1 ==
+               static_cast<int>(summary_.iterations.size());
+  }
+
   bool gradient_vanished(const Step& step) {
     // |J_i^T r| / |J_i| is at most |r|: the ratio is the cosine between residual and column.
     if (!(step.gradient_max <= options_.gradient_tolerance * std::sqrt(2 * cost_))) return false;
@@ -199,7 +268,7 @@ class Loop {
   }
 
   bool out_of_iterations() {
-    if (static_cast<int>(summary_.iterations.size()) <= options_.max_iterations) return false;
+    if (steps_of(summary_) < options_.max_iterations) return false;
     end(Termination::max_iterations,
         "stopped after " + std::to_string(options_.max_iterations) + " iterations, as asked");
     return true;
@@ -223,7 +292,7 @@ class Loop {
   }
 
   void publish(Iteration it) {
-    it.time_s = since_begin_.seconds();
+    it.time_s = since_start_.seconds() - summary_.setup_s;
     summary_.iterations.push_back(it);
     if (history_ != nullptr)
       *history_ = {control_.state(), true,           cost_,   plain_cost_, forcing_, precise_,
@@ -243,7 +312,6 @@ class Loop {
   ScaledLoss loss_;
   const SolveOptions& options_;
   const Stopwatch& since_start_;
-  const Stopwatch since_begin_;
   Summary& summary_;
   const double settled_motion_px_;
   std::optional<LoopHistory>* history_ = nullptr;
@@ -254,10 +322,15 @@ class Loop {
   double cost_ = 0, plain_cost_ = 0;
   /// Float inside the linear solver resolves what is left of the cost no longer.
   bool precise_ = false;
-  int small_decreases_ = 0;
+  int small_decreases_ = 0, rejected_in_a_row_ = 0;
   double last_decrease_ = 1, stretch_ = 1;
   bool any_finite_trial_ = false;
   bool begun_ = false, done_ = false;
+  const Hooks* hooks_ = nullptr;
+  bool restarts_ = false;
+  std::vector<int> last_iterations_;
+  double recent_iterations_ = 0;
+  std::size_t attempt_begin_ = 0;  ///< index of the iteration that this attempt started from
 };
 
 }  // namespace
@@ -267,12 +340,21 @@ double default_damping(std::size_t images) {
   return std::min(1e-2, 2e-5 * std::pow(scale, 4));
 }
 
-void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
+int steps_of(const Summary& summary) {
+  int steps = static_cast<int>(summary.iterations.size()) - 1;
+  for (const Iteration& it : summary.iterations) steps -= it.passes > 0;
+  for (const Recovery& recovery : summary.recoveries) steps += recovery.passes;
+  return steps;
+}
+
+bool minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
               const Stopwatch& since_start, Summary& summary, double settled_motion_px,
-              std::optional<LoopHistory>* history) {
+              std::optional<LoopHistory>* history, const Hooks* hooks) {
   Loop loop(system, loss, options, since_start, summary, settled_motion_px);
   loop.keep(history);
+  loop.may_ask(hooks);
   loop.run();
+  return loop.restarts();
 }
 
 }  // namespace sheaf

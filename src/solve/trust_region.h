@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -42,6 +43,18 @@ struct LoopHistory {
   }
 };
 
+/// What is to be done where an early step went wrong: go on, start again from a better state that
+/// was found, or end, since no gain could be seen.
+enum class Recourse { none, restart, end };
+
+/// What the loop asks those who built the system.
+struct Hooks {
+  std::function<Recourse()> recover;
+  /// Whether another camera solver is to go on, given how many conjugate gradient iterations the
+  /// last steps took.
+  std::function<bool(double iterations)> change_solver;
+};
+
 /// Levenberg-Marquardt or a dogleg, with gain-ratio control, on any System, with one loss. Adds to
 /// the summary's iterations, and sets costs, termination and words; the best state is the system's
 /// held one.
@@ -51,9 +64,15 @@ struct LoopHistory {
 /// `history`: what an earlier call left there is gone on from, and this one leaves its own after
 /// every step, before on_iteration is called. With Home::history and the state of that moment, the
 /// steps are those of a run that was never stopped.
-void minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
+/// `hooks` are asked where an early step went wrong, and after steps of many conjugate gradients;
+/// where they want another state or another solver, the loop ends and returns true, with no reason
+/// for stopping set.
+bool minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
               const Stopwatch& since_start, Summary& summary,
               double settled_motion_px = std::numeric_limits<double>::infinity(),
-              std::optional<LoopHistory>* history = nullptr);
+              std::optional<LoopHistory>* history = nullptr, const Hooks* hooks = nullptr);
+
+/// What counts as an iteration: steps, rejected ones included, and passes of recoveries.
+int steps_of(const Summary& summary);
 
 }  // namespace sheaf

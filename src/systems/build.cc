@@ -35,6 +35,7 @@ const char* simd_name(Simd simd) {
 
 ChartBase chart_base(PointParametrisation points) {
   switch (points) {
+    case PointParametrisation::automatic:  // Build::plan has chosen
     case PointParametrisation::xyz:
       return ChartBase::none;
     case PointParametrisation::homogeneous:
@@ -68,12 +69,14 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 }
 
 Build::Build(const SolveOptions& options, const Kernels& kernels, Threads& threads)
-    : options_(&options), kernels_(&kernels), threads_(&threads) {}
+    : options_(options), kernels_(&kernels), threads_(&threads) {}
 
 Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
                           Threads& threads) {
   Build build(options, kernels, threads);
+  build.points_ = choose_points(problem, skip, options);
+  build.options_.points = build.points_.points;
   if (BalView::serves(problem, options.fixed)) build.view_.emplace(problem, options.fixed);
   const Result<void> done =
       build.view_ ? build.plan_bal(problem, skip) : build.plan_lenses(problem, skip);
@@ -82,10 +85,10 @@ Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
 }
 
 Result<void> Build::plan_bal(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  Columns columns = number_columns(problem, options_->fixed, view_->held());
-  const bool only_images = options_->fixed.points && !columns.lens_shared &&
-                           options_->trust_region == TrustRegion::lm &&
-                           options_->solver == CameraSolverKind::automatic;
+  Columns columns = number_columns(problem, options_.fixed, view_->held());
+  const bool only_images = options_.fixed.points && !columns.lens_shared &&
+                           options_.trust_region == TrustRegion::lm &&
+                           options_.solver == CameraSolverKind::automatic;
   return only_images ? plan_images(problem, skip, std::move(columns))
                      : plan_points(problem, skip, std::move(columns));
 }
@@ -93,7 +96,7 @@ Result<void> Build::plan_bal(const Problem& problem, const std::vector<std::uint
 /// Images by themselves.
 Result<void> Build::plan_images(const Problem& problem, const std::vector<std::uint8_t>& skip,
                                 Columns columns) {
-  Result<Choice> choice = choose_for_images(columns, count_image_batches(problem), *options_,
+  Result<Choice> choice = choose_for_images(columns, count_image_batches(problem), options_,
                                             {resident_bytes(), peak_resident_bytes()});
   if (!choice.ok()) return choice.error();
   choice_ = std::move(choice).value();
@@ -106,16 +109,16 @@ Result<void> Build::plan_images(const Problem& problem, const std::vector<std::u
 
 Result<void> Build::plan_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
                                 Columns columns) {
-  const bool held = options_->fixed.points;
+  const bool held = options_.fixed.points;
   Batches batches = arrange(problem, skip, *threads_);
   view_->turn(problem, batches, *threads_);
   Clusters clusters;
   WorkCounts counts = count_work(batches, columns, held, clusters, *threads_);
-  counts.weighted = options_->loss.kind != LossKind::none;
-  counts.dogleg = options_->trust_region == TrustRegion::dogleg;
-  lends_ = lends_observations(problem, batches, *options_, *threads_);
+  counts.weighted = options_.loss.kind != LossKind::none;
+  counts.dogleg = options_.trust_region == TrustRegion::dogleg;
+  lends_ = lends_observations(problem, batches, options_, *threads_);
   const std::uint64_t lent = lends_ ? LentObservations::bytes(problem, !view_->turns()) : 0;
-  Result<Choice> choice = choose_solver(counts, *options_, threads_->count(),
+  Result<Choice> choice = choose_solver(counts, options_, threads_->count(),
                                         {resident_bytes() - lent, peak_resident_bytes()});
   if (!choice.ok()) return choice.error();
   choice_ = std::move(choice).value();
@@ -127,10 +130,10 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
 }
 
 Result<void> Build::plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  Result<Arrangement> arranged = arrange_with_lenses(problem, options_->fixed, skip, *threads_);
+  Result<Arrangement> arranged = arrange_with_lenses(problem, options_.fixed, skip, *threads_);
   if (!arranged.ok()) return arranged.error();
   arranged_ = std::make_unique<Arrangement>(std::move(arranged).value());
-  Result<LensChoice> chosen = choose_for_lenses(*arranged_, *options_, *threads_);
+  Result<LensChoice> chosen = choose_for_lenses(*arranged_, options_, *threads_);
   if (!chosen.ok()) return chosen.error();
   choice_ = std::move(chosen.value().choice);
   arranged_->lists = std::move(chosen.value().chunks);
@@ -151,8 +154,8 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
     return std::make_unique<ImageSystem>(cameras(problem), problem.image_camera,
                                          std::move(*by_image_), arranged_->columns,
                                          watches_behind(), image_kernels(kernels.name), *threads_);
-  const PointRules rules{options_->fixed.points, watches_behind(), options_->inner_iterations,
-                         chart_base(options_->points)};
+  const PointRules rules{options_.fixed.points, watches_behind(), options_.inner_iterations,
+                         chart_base(options_.points), points_.crosses};
   if (view_) cut_bal_lists(choice_.plan.kind, rules.held, *threads_, *arranged_);
   const Columns& columns = arranged_->columns;
   CameraColumns camera_columns = view_ ? CameraColumns::of_bal(columns, problem.image_camera)

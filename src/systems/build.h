@@ -14,6 +14,7 @@
 #include "sheaf/options.h"
 #include "systems/arrangement.h"
 #include "systems/bal_view.h"
+#include "systems/choose_points.h"
 #include "systems/choose_solver.h"
 #include "systems/home.h"
 
@@ -32,6 +33,7 @@ class Build {
                             Threads& threads);
 
   const Choice& choice() const { return choice_; }
+  const PointChoice& points() const { return points_; }
   /// Whether the problem's observations are to be lent while home() lives.
   bool lends() const { return lends_; }
   /// Frees the problem's observations until `lent` goes, which must outlive neither of them.
@@ -51,9 +53,10 @@ class Build {
                            Columns columns);
   Result<void> plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip);
   CameraState cameras(const Problem& problem) const;
-  bool watches_behind() const { return options_->cheirality != Cheirality::formula; }
+  bool watches_behind() const { return options_.cheirality != Cheirality::formula; }
 
-  const SolveOptions* options_;
+  SolveOptions options_;  ///< with the points' coordinates chosen
+  PointChoice points_;
   const Kernels* kernels_;
   Threads* threads_;
   std::optional<BalView> view_;           ///< of lenses that BAL's formula describes

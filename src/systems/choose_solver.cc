@@ -59,6 +59,18 @@ std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 999999) / 1000000) + " MB";
 }
 
+/// An analysis, which may be large, is made again where it is needed.
+std::shared_ptr<const WorkCounts> to_think_over(const WorkCounts& counts, SolverKind kind,
+                                                const SolveOptions& options) {
+  const bool iterative = kind == SolverKind::explicit_cg || kind == SolverKind::implicit_cg;
+  if (options.solver != CameraSolverKind::automatic || options.memory_limit_bytes > 0 ||
+      options.trust_region == TrustRegion::dogleg || !iterative)
+    return nullptr;
+  auto copy = std::make_shared<WorkCounts>(counts);
+  copy->analysis = nullptr;
+  return copy;
+}
+
 }  // namespace
 
 Error over_memory_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more) {
@@ -101,6 +113,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
   choice.plan.mixed = takes_mixed(choice.plan.kind, counts, options);
   if (choice.plan.kind == SolverKind::sparse) choice.plan.analysis = counts.analysis;
   choice.forecast_bytes = forecast(choice.plan);
+  choice.counts = to_think_over(counts, choice.plan.kind, options);
   if (options.memory_limit_bytes == 0 || choice.forecast_bytes <= options.memory_limit_bytes)
     return choice;
   Plan leanest{SolverKind::implicit_cg, "",

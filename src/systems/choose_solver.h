@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "sheaf/error.h"
@@ -23,6 +24,9 @@ struct MemoryHeld {
 struct Choice {
   Plan plan;
   std::uint64_t forecast_bytes = 0;  ///< of the process
+  /// What the choice may be thought over by, once conjugate gradients have run; null where it
+  /// stands.
+  std::shared_ptr<const WorkCounts> counts{};
 };
 Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& options, int threads,
                              const MemoryHeld& held);

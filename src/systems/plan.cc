@@ -66,7 +66,10 @@ constexpr double kPairNs = 8, kImplicitNs = 5, kBlockNs = 12, kPlaceNs = 200, kD
 constexpr double kLensImplicitNs = 30;
 /// Conjugate gradient steps of a typical solve: with a coarse space as many on streets as in
 /// collections.
-double iterations(const WorkCounts& c) { return c.clusters > 0 ? 9 : 15; }
+double iterations(const WorkCounts& c) {
+  if (c.iterations > 0) return c.iterations;
+  return c.clusters > 0 ? 9 : 15;
+}
 /// The coarse matrix: an observation's part in it, every other step; its factor's entries to
 /// substitute with.
 constexpr double kCoarseNs = 6, kCoarseEntryNs = 0.5;
@@ -198,6 +201,29 @@ Plan plan_solver(const WorkCounts& c) {
     return {sparse < dense ? SolverKind::sparse : SolverKind::dense, counts + costs};
   if (explicit_cg <= implicit_cg) return {SolverKind::explicit_cg, counts + costs};
   return {SolverKind::implicit_cg, counts + costs};
+}
+
+std::optional<Plan> better_plan(WorkCounts c, SolverKind present, double iterations) {
+  constexpr double kWorthIt = 1.5;
+  c.iterations = iterations;
+  const auto cost = [&c](SolverKind kind) {
+    switch (kind) {
+      case SolverKind::blocks:
+        break;
+      case SolverKind::dense:
+        return dense_seconds(c);
+      case SolverKind::sparse:
+        return sparse_seconds(c);
+      case SolverKind::explicit_cg:
+        return explicit_seconds(c);
+      case SolverKind::implicit_cg:
+        return implicit_seconds(c);
+    }
+    return 0.0;
+  };
+  Plan plan = plan_solver(c);
+  if (plan.kind == present || kWorthIt * cost(plan.kind) > cost(present)) return std::nullopt;
+  return plan;
 }
 
 SolverKind cheaper_iterative(const WorkCounts& c) {

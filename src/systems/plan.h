@@ -53,6 +53,7 @@ struct WorkCounts {
   bool only_formed = false;          ///< there is no implicit product
   std::optional<LensCounts> lenses;  ///< of any model: implicit products are dearer
   std::uint64_t other_bytes = 0;     ///< held besides
+  double iterations = 0;  ///< conjugate gradients of a step, where known; 0: typical ones
 
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
@@ -80,6 +81,10 @@ bool prefers_mixed(SolverKind kind);
 
 /// The cheapest by a model of flops and bytes per step: a pure function of the counts.
 Plan plan_solver(const WorkCounts& counts);
+
+/// Once conjugate gradients have run: the plan that is cheaper by half at least than the present
+/// kind, with so many iterations a step, or none.
+std::optional<Plan> better_plan(WorkCounts counts, SolverKind present, double iterations);
 
 /// The cheaper of the two iterative ones.
 SolverKind cheaper_iterative(const WorkCounts& counts);

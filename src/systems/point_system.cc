@@ -84,7 +84,7 @@ void PointSystem::place_charts() {
   if (rules_.held || rules_.charts == ChartBase::none) return;
   const SceneFrame frame = scene_frame(state_.held.cameras);
   chart_.base = rules_.charts;
-  chart_.crosses = !rules_.watch_behind;
+  chart_.crosses = rules_.crosses;
   chart_.origin = frame.origin;
   chart_.unit = frame.unit;
 }

@@ -24,6 +24,7 @@ struct PointRules {
   bool watch_behind = false;
   int inner_iterations = 0;            ///< of each point by itself, once the cameras have stepped
   ChartBase charts = ChartBase::none;  ///< what their local coordinates are about
+  bool crosses = true;                 ///< whether a step may take them through infinity
 };
 
 /// The home of all rows whose points are eliminated, on CPU threads: the point pass over chunks,

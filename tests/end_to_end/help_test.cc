@@ -80,7 +80,7 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
                     "--loss", "--cheirality", "--points", "--fix", "--refine", "--solver",
                     "--memory-limit", "--trust-region", "--initial-damping", "--inner-iterations",
-                    "--simd", "--precision"});
+                    "--recoveries", "--simd", "--precision"});
   return options;
 }
 

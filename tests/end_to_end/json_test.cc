@@ -225,6 +225,7 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"trust_region", "dogleg"},
                                 {"initial_damping", 0.01},
                                 {"inner_iterations", 3},
+                                {"recoveries", 3},
                                 {"simd", "best"}}));
   EXPECT_EQ(s["input"]["path"], "in.txt");
   EXPECT_EQ(s["input"]["cameras"], 16);

@@ -9,6 +9,7 @@
 
 #include "platform/clock.h"
 #include "sheaf/sheaf.h"
+#include "solve/loss_rounds.h"
 #include "solve/trust_region.h"
 #include "systems/build.h"
 
@@ -93,6 +94,48 @@ TEST(History, GoesOnAsIfNothingHadHappened) {
       options.loss = {loss, loss == LossKind::tukey ? 4.0 : 1.5};
       expect_equal_runs(problem, options);
     }
+}
+
+TEST(History, AnotherSolverGoesOn) {
+  const Problem start = street();
+  for (const Loss& loss : {Loss(), Loss(Huber{1.5})}) {
+    Problem problem = start;
+    SolveOptions options;
+    options.loss = loss;
+    options.initial_damping = 1e-4;
+    options.solver = CameraSolverKind::iterative_implicit;
+    Threads threads(2);
+    Summary summary;
+    std::optional<LoopHistory> history;
+    int asked = 0;
+    const Hooks hooks{[] { return Recourse::none; },
+                      [&](double iterations) {
+                        EXPECT_GT(iterations, 0);
+                        ++asked;
+                        return options.solver == CameraSolverKind::iterative_implicit;
+                      }};
+    const Stopwatch clock;
+    for (CameraSolverKind solver :
+         {CameraSolverKind::iterative_implicit, CameraSolverKind::sparse}) {
+      options.solver = solver;
+      Build build =
+          Build::plan(problem, options, {}, *choose_kernels(Simd::best).value(), threads).value();
+      const std::unique_ptr<Home> home = build.make_home(problem);
+      const bool changes = minimize_in_rounds(*home, options, clock, summary, &history, &hooks);
+      EXPECT_EQ(changes, solver == CameraSolverKind::iterative_implicit);
+      build.store(*home, problem);
+    }
+    EXPECT_EQ(asked, 1) << "a factor takes no iterations";
+    EXPECT_EQ(summary.rounds.size(), 1u);
+    double cost = summary.initial_cost;
+    for (std::size_t i = 1; i < summary.iterations.size(); ++i) {
+      EXPECT_EQ(summary.iterations[i].index, static_cast<int>(i));
+      EXPECT_LE(summary.iterations[i].cost, cost * (1 + 1e-12));
+      cost = summary.iterations[i].cost;
+    }
+    Problem plain = start;
+    EXPECT_NEAR(summary.final_cost, solve(plain, options).final_cost, 1e-7 * cost);
+  }
 }
 
 }  // namespace

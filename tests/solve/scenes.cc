@@ -170,6 +170,10 @@ double scaled_gradient(const Problem& problem, const Fixed& fixed, std::size_t p
   return largest;
 }
 
+std::string case_file(const std::string& name) {
+  return (std::filesystem::path(SHEAF_SOURCE_DIR) / "tests" / "data" / name).string();
+}
+
 std::string real_data(const std::string& name) {
   const char* folder = std::getenv("SHEAF_DATA");
   const std::filesystem::path path =

@@ -43,6 +43,9 @@ struct Disturbance {
 };
 void disturb(Problem& problem, const Disturbance& by);
 
+/// A file of tests/data, an input that once failed.
+std::string case_file(const std::string& name);
+
 /// A real problem's path, or "" when it is not there: $SHEAF_DATA/bal, data/bal by default.
 std::string real_data(const std::string& name);
 
