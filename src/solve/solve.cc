@@ -118,7 +118,8 @@ class Attempts {
         clock_(clock),
         summary_(summary),
         threads_(options.threads),
-        skip_(held_out(problem, options, threads_, summary)) {
+        skip_(held_out(problem, options, threads_, summary)),
+        used_(problem.num_observations() - summary.rejected_observations.size()) {
     if (options_.initial_damping == 0)
       options_.initial_damping = default_damping(problem.num_images());
   }
@@ -141,9 +142,9 @@ class Attempts {
     if (!planned.ok()) return planned.error();
     Build& build = planned.value();
     if (first) tell(build, options_, kernels_, threads_, summary_);
-    bool behind_after = false;
+    bool behind_after = false, restarts = false;
     {
-      if (build.lends()) summary_.behind_camera_before = behind_camera(problem_, threads_);
+      if (first && build.lends()) summary_.behind_camera_before = behind_camera(problem_, threads_);
       std::optional<LentObservations> lent;
       if (build.lends()) build.lend(problem_, lent);
       const std::unique_ptr<Home> home = build.make_home(problem_);
@@ -152,12 +153,14 @@ class Attempts {
       if (first) summary_.setup_s = clock_.seconds();
       const Hooks hooks{[&] { return find_better(build, *home); },
                         [&](double iterations) { return change_solver(build, *home, iterations); }};
-      if (minimize_in_rounds(*home, options_, clock_, summary_, &history_, &hooks)) {
-        if (!better_) better_ = std::move(reached_);  // the better state was none
-        return {};
-      }
-      build.store(*home, problem_);
-      behind_after = home->count_behind() > 0;
+      restarts = minimize_in_rounds(*home, options_, clock_, summary_, &history_, &hooks);
+      if (!restarts) build.store(*home, problem_);
+      behind_after = !restarts && home->count_behind() > 0;
+    }
+    if (restarts) {
+      if (seeks_) seek_better();
+      if (!better_) better_ = reached_;  // there was none
+      return {};
     }
     summary_.solve_s = clock_.seconds() - summary_.setup_s;
     if (behind_after) summary_.behind_camera_after = behind_camera(problem_, threads_);
@@ -176,40 +179,45 @@ class Attempts {
   }
 
   /// Whether there is a better state than the home's, or none that could be seen to be.
-  /// Observations that are lent are not at hand.
   Recourse find_better(const Build& build, const Home& home) {
-    const int left = options_.max_iterations - steps_of(summary_);
     // A state that fits to a twentieth of a pixel is not far from anything.
-    const std::size_t used = problem_.num_observations() - summary_.rejected_observations.size();
-    const bool near = rms(summary_.iterations.back().cost, used) < 0.05;
-    if (options_.recoveries == 0 || build.lends() || left <= 0 || near) return Recourse::none;
+    const bool near = rms(summary_.iterations.back().cost, used_) < 0.05;
+    if (options_.recoveries == 0 || near || steps_of(summary_) >= options_.max_iterations)
+      return Recourse::none;
     --options_.recoveries;
-    const Estimate start = estimate_of(problem_);
+    start_ = estimate_of(problem_);
     build.store(home, problem_);
-    const Estimate reached = estimate_of(problem_);
-    put(start, problem_);
-    const RecoveryRequest request{
-        problem_,       skip_,
-        options_.fixed, {options_.loss.kind, summary_.rounds.back().scale_px},
-        left,           [this] { return out_of_time(); }};
-    Recovered found = recover(request, start, reached, threads_);
+    reached_ = estimate_of(problem_);
+    put(start_, problem_);
+    // Observations that are lent are at hand again once the home is gone.
+    seeks_ = build.lends();
+    return seeks_ ? Recourse::restart : seek_better();
+  }
+
+  /// Sets `better_` where recover() finds it; the problem's observations must be at hand.
+  Recourse seek_better() {
+    seeks_ = false;
+    const RecoveryRequest request{problem_,
+                                  skip_,
+                                  options_.fixed,
+                                  {options_.loss.kind, summary_.rounds.back().scale_px},
+                                  options_.max_iterations - steps_of(summary_),
+                                  [this] { return out_of_time(); }};
+    Recovered found = recover(request, start_, reached_, threads_);
     if (found.found && options_.cheirality != Cheirality::formula &&
-        puts_behind(start, reached, found.state))
+        puts_behind(start_, reached_, found.state))
       found.found = found.record.taken = false;
     found.record.after_step = summary_.iterations.back().index;
     summary_.recoveries.push_back(found.record);
-    if (found.found)
-      better_ = std::move(found.state);
-    else
-      options_.recoveries = 0;
     if (found.found) {
-      reached_ = reached;
+      better_ = std::move(found.state);
       history_.reset();
       return Recourse::restart;
     }
-    put(reached, problem_);
+    options_.recoveries = 0;
+    put(reached_, problem_);
     const bool drowned = drowning_observation(problem_, skip_, request.loss, threads_).has_value();
-    put(start, problem_);
+    put(start_, problem_);
     return drowned ? Recourse::end : Recourse::none;
   }
 
@@ -257,8 +265,10 @@ class Attempts {
   Summary& summary_;
   Threads threads_;
   const std::vector<std::uint8_t> skip_;
+  const std::size_t used_;          ///< observations
   std::optional<Estimate> better_;  ///< to go on from
-  Estimate reached_;                ///< before that was found
+  Estimate start_, reached_;        ///< of the attempt, when a better one was sought
+  bool seeks_ = false;              ///< a better one is to be sought once the home is gone
   std::optional<LoopHistory> history_;
 };
 

@@ -32,6 +32,8 @@ constexpr std::size_t kEarly = 15;
 constexpr double kStillFar = 0.1;
 /// A dogleg begins with steps that are too long, and a shorter one costs it little.
 constexpr int kDoglegPatience = 3;
+/// px^2. No image is so large.
+constexpr double kAbsurdCost = 1e20;
 /// Steps whose conjugate gradients say what the next ones will take.
 constexpr std::size_t kRecent = 4;
 /// A step that changes no block by more than this (relative) is rounding.
@@ -263,6 +265,12 @@ class Loop {
   bool gradient_vanished(const Step& step) {
     // |J_i^T r| / |J_i| is at most |r|: the ratio is the cosine between residual and column.
     if (!(step.gradient_max <= options_.gradient_tolerance * std::sqrt(2 * cost_))) return false;
+    // Beside one absurd residual every column looks like none.
+    if (hooks_ != nullptr && cost_ > kAbsurdCost && !moved() &&
+        hooks_->recover() == Recourse::restart) {
+      restarts_ = done_ = true;
+      return true;
+    }
     end(Termination::gradient_converged, "converged: the scaled gradient is below its tolerance");
     return true;
   }
