@@ -25,7 +25,7 @@ struct RecoveryRequest {
 
 /// A state that is better by kWorth at least than the one reached, or none.
 struct Recovered {
-  static constexpr double kWorth = 0.1;
+  static constexpr double kWorth = 0.05;
   bool found = false;
   Estimate state{};
   Recovery record{};
