@@ -90,6 +90,8 @@ PointChoice choose_points(const Problem& problem, const std::vector<std::uint8_t
   std::array<char, 96> text{};
   std::snprintf(text.data(), text.size(), "%.2g %% of the points have a parallax below %.0f px",
                 100 * share, kSmallParallax_px);
+  if (options.loss.kind != LossKind::none && share < kMostly)
+    return {PointParametrisation::xyz, crosses, "a loss is quicker with them"};
   if (share < kEnough) return {PointParametrisation::xyz, crosses, text.data()};
   return {PointParametrisation::inverse_depth, crosses && share >= kMostly, text.data()};
 }

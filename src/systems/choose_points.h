@@ -21,8 +21,10 @@ struct PointChoice {
 /// What is asked for; for `automatic`, inverse depth that may not cross infinity where at least 2 %
 /// of the points are seen under a parallax of less than 20 px, else X, Y, Z. (A pixel of noise
 /// moves such a point by more than a twentieth of its depth, which no linear model in X, Y, Z
-/// follows. Streets have 12 % of them and more, collections of photographs 0.2 % at most.) The rule
-/// looks at the problem and its state alone. skip: 1 for each observation to leave out, or empty.
+/// follows. Streets have 12 % of them and more, collections of photographs 0.2 % at most. Under a
+/// loss points that may not cross end later than in X, Y, Z, unless half of all have so little
+/// parallax.) The rule looks at the problem and its state alone. skip: 1 for each observation to
+/// leave out, or empty.
 PointChoice choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
                           const SolveOptions& options);
 

@@ -43,6 +43,9 @@ TEST(ChoosePoints, WhatIsAskedForIsTaken) {
   options.fixed.points = true;
   EXPECT_EQ(choose_points(problem, {}, options).points, PointParametrisation::xyz);
   options = {};
+  options.loss = Huber{1};
+  EXPECT_EQ(choose_points(problem, {}, options).points, PointParametrisation::xyz);
+  options = {};
   options.trust_region = TrustRegion::dogleg;
   EXPECT_EQ(choose_points(problem, {}, options).points, PointParametrisation::xyz);
 }
