@@ -3,10 +3,12 @@
 """Checks of the bench's own arithmetic on canned runs: side_by_side.py --self-test"""
 import math
 import os
+import random
 import sys
 import tempfile
 import xml.dom.minidom
 
+import basin
 import cost_plot
 import evaluate
 import losses
@@ -243,9 +245,27 @@ def check_old_new():
     assert slower == ["a"] and "1.500  [+50.0 %, +50.0 %]  slower" in text
 
 
+def check_basin():
+    scene = basin.Scene(TINY)
+    assert scene.counts == [2, 2, 3] and basin.Scene(scene.text()).text() == scene.text()
+    camera = list(scene.cameras[1])
+    camera[3:6] = [1.0, 2.0, 3.0]
+    before = basin.back(basin.matrix(camera[:3]), camera[3:6])
+    moved = list(camera)
+    basin.move_camera(moved, random.Random(1), 0.5, 0)
+    after = basin.back(basin.matrix(moved[:3]), moved[3:6])
+    assert moved[:3] != camera[:3] and max(abs(a - b) for a, b in zip(before, after)) < 1e-12
+    basin.put_at_depth(scene, 7)
+    image, point, x, y = 0, 0, 1.0, 0.0  # the first observation of the first point
+    local = [a + b for a, b in zip(basin.times(basin.matrix(scene.cameras[image][:3]),
+                                               scene.points[point]), scene.cameras[image][3:6])]
+    assert abs(local[2] + 7) < 1e-12 and abs(-local[1] / local[2] * 10 - y) < 1e-12, local
+    assert abs(-local[0] / local[2] * 10 - x) < 1e-12
+
+
 def run():
     for check in (check_evaluation, check_table, check_plot, check_sheaf_adapter, check_pages,
-                  check_suite, check_ladder, check_losses, check_old_new):
+                  check_suite, check_ladder, check_losses, check_old_new, check_basin):
         check()
         print(f"{check.__name__}: passed")
     return 0
