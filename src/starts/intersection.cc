@@ -121,14 +121,7 @@ std::vector<Ray> rays_of(const Views& views, std::span<const std::uint64_t> seen
     const auto direction = bearing(views.camera(image), views.sights.pixel(i));
     if (!direction) continue;
     const Matrix3<double>& R = views.rotations[image];
-    const auto& t = views.state.poses[image].translation;
-    Ray ray;
-    for (std::size_t k = 0; k < 3; ++k) {
-      ray.from[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-      ray.along[k] =
-          R[k] * (*direction)[0] + R[3 + k] * (*direction)[1] + R[6 + k] * (*direction)[2];
-    }
-    rays.push_back(ray);
+    rays.push_back({camera_centre(R, views.state.poses[image]), turned_back(R, *direction)});
   }
   return rays;
 }

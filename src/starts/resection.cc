@@ -126,11 +126,8 @@ std::vector<std::uint64_t> some_of(std::span<const std::uint64_t> seen) {
 /// The pose with the same centre whose rotation turns the points' directions into the bearings.
 std::optional<Pose> turned(const Sights& sights, const std::vector<double>& points,
                            const std::vector<std::uint64_t>& seen, const View& view) {
-  const Matrix3<double> R = matrix_from_quaternion(view.pose.rotation);
-  const auto& t = view.pose.translation;
-  Vector3<double> centre;
-  for (std::size_t k = 0; k < 3; ++k)
-    centre[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  const Vector3<double> centre =
+      camera_centre(matrix_from_quaternion(view.pose.rotation), view.pose);
   Matrix3<double> S{};
   for (std::uint64_t i : seen) {
     const auto d = bearing(view.camera, sights.pixel(i));

@@ -58,6 +58,18 @@ Fit fit_of_image(const Sights& sights, std::size_t image, const Estimate& state,
   return all;
 }
 
+Vector3<double> turned_back(const Matrix3<double>& R, const Vector3<double>& v) {
+  Vector3<double> out;
+  for (std::size_t k = 0; k < 3; ++k) out[k] = R[k] * v[0] + R[3 + k] * v[1] + R[6 + k] * v[2];
+  return out;
+}
+
+Vector3<double> camera_centre(const Matrix3<double>& rotation, const Pose& pose) {
+  Vector3<double> centre = turned_back(rotation, pose.translation);
+  for (double& x : centre) x = -x;
+  return centre;
+}
+
 Vector3<double> in_camera(const Matrix3<double>& rotation, const Pose& pose, const double* X) {
   Vector3<double> P = multiply(rotation, Vector3<double>{X[0], X[1], X[2]});
   for (std::size_t k = 0; k < 3; ++k) P[k] += pose.translation[k];

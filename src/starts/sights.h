@@ -67,6 +67,10 @@ Fit fit_of(const Camera& camera, const Vector3<double>& P, const double* pixel,
 Fit fit_of_image(const Sights& sights, std::size_t image, const Estimate& state,
                  const ScaledLoss& loss);
 
+/// The inverse rotation: of a direction in a camera's frame, the direction in the world's.
+Vector3<double> turned_back(const Matrix3<double>& rotation, const Vector3<double>& v);
+/// -R^T t.
+Vector3<double> camera_centre(const Matrix3<double>& rotation, const Pose& pose);
 /// X in the frame of a camera.
 Vector3<double> in_camera(const Matrix3<double>& rotation, const Pose& pose, const double* X);
 

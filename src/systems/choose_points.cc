@@ -11,6 +11,7 @@
 
 #include "geometry/camera_model.h"
 #include "geometry/rotation.h"
+#include "starts/sights.h"
 
 namespace sheaf {
 namespace {
@@ -20,15 +21,6 @@ constexpr std::size_t kLookedAt = 1024;
 constexpr double kSmallParallax_px = 20, kEnough = 0.02;
 /// Where the camera all but rotates alone no depth is known, and there is no side to keep to.
 constexpr double kMostly = 0.5;
-
-Vector3<double> centre_of(const Pose& pose) {
-  const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-  const auto& t = pose.translation;
-  Vector3<double> centre;
-  for (std::size_t k = 0; k < 3; ++k)
-    centre[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-  return centre;
-}
 
 /// A point that is looked at: its first ray, and the largest parallax so far.
 struct Looked {
@@ -53,7 +45,8 @@ double share_of_small_parallax(const Problem& problem, const std::vector<std::ui
   std::vector<Looked> looked(problem.num_points() / stride + 1);
   std::vector<Vector3<double>> centres;
   centres.reserve(problem.num_images());
-  for (const Pose& pose : problem.poses) centres.push_back(centre_of(pose));
+  for (const Pose& pose : problem.poses)
+    centres.push_back(camera_centre(matrix_from_quaternion(pose.rotation), pose));
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
     const std::size_t point = problem.observation_point[i];
     if ((point & (stride - 1)) != 0 || (!skip.empty() && skip[i] != 0)) continue;
