@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/camera_model.h"
 #include "geometry/rotation.h"
+#include "scene/camera_plane.h"
 #include "starts/resection.h"
 #include "starts/sights.h"
 
@@ -66,24 +66,19 @@ bool has_free_columns(const Problem& problem, const Fixed& fixed) {
   return false;
 }
 
-/// Why the start is not finite, by the first observation whose point its camera cannot project.
+/// Why the start is not finite: the first observation whose point has no pixel.
 std::string not_finite_words(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  for (std::uint64_t i = 0; i < problem.num_observations(); ++i) {
-    if (!skip.empty() && skip[i] != 0) continue;
-    const Pose& pose = problem.poses[problem.observation_image[i]];
-    const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
-    const Vector3<double> P = in_camera(matrix_from_quaternion(pose.rotation), pose, X);
-    const Camera& camera = problem.cameras[problem.image_camera[problem.observation_image[i]]];
-    const bool in_plane = P[2] == 0;
-    const bool at_centre = in_plane && P[0] == 0 && P[1] == 0;
-    const double* pixel = &problem.observation_xy[2 * i];
-    if (!in_plane && std::isfinite(fit_of(camera, P, pixel, {}).cost)) continue;
-    const char* const where = at_centre ? " has its point at the camera's centre"
-                              : in_plane
-                                  ? " has its point in the plane of the camera's centre (Z = 0)"
-                                  : " has a residual that overflows";
-    return "the cost of the start is not finite: " + name_of(problem, i) + where + kRemedy;
-  }
+  const auto first = [&](const std::vector<std::uint64_t>& list) {
+    return std::find_if(list.begin(), list.end(),
+                        [&](std::uint64_t i) { return skip.empty() || skip[i] == 0; });
+  };
+  const PlaneSights sights = plane_sights(problem);
+  const std::string start = "the cost of the start is not finite: ";
+  if (const auto i = first(sights.at_centre); i != sights.at_centre.end())
+    return start + name_of(problem, *i) + " has its point at the camera's centre" + kRemedy;
+  if (const auto i = first(sights.in_plane); i != sights.in_plane.end())
+    return start + name_of(problem, *i) +
+           " has its point in the plane of the camera's centre (Z = 0)" + kRemedy;
   return "no step led to a finite cost, however short: the numbers overflow";
 }
 

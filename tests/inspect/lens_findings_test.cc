@@ -11,7 +11,6 @@
 #include "geometry/lenses.h"
 #include "inspect/check.h"
 #include "io/models.h"
-#include "sheaf/io.h"
 #include "sheaf/scene.h"
 
 namespace sheaf {
@@ -127,16 +126,10 @@ INSTANTIATE_TEST_SUITE_P(OfEveryModel, LensFindings, testing::Range<std::size_t>
                            return std::string(to_string(static_cast<CameraModel>(info.param)));
                          });
 
-/// k3 and k4 of a fisheye that is measured near its axis alone: sound there, and folding beyond.
-TEST(LensFindingsOfFiles, UndeterminedDistortion) {
-  const std::vector<Finding> found = check(read("tests/data/undetermined-distortion").value());
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_EQ(found[0].code, "folding-corners");
-  EXPECT_FALSE(found[0].grave);
-}
-
-TEST(LensFindingsOfFiles, ZeroFocalLength) {
-  const std::vector<Finding> found = check(read("tests/data/zero-focal").value());
+TEST(LensFindingsOfProblems, ZeroFocalLength) {
+  Problem problem = test::seen_by({test::ordinary(CameraModel::simple_radial)}, 4, 20, 1);
+  problem.cameras[0].parameters[0] = 0;
+  const std::vector<Finding> found = check(problem);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].code, "absurd-focal");
 }

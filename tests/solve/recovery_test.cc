@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/rotation.h"
 #include "sheaf/io.h"
 #include "sheaf/solve.h"
 #include "solve/scenes.h"
@@ -16,19 +15,10 @@ namespace {
 /// Every image turned about its centre by some 0.8 radians.
 Problem turned_scene() {
   Problem problem = small_scene().start;
-  disturb(problem, {.rotation_rad = 0, .center = 0, .point = 0, .focal = 0, .seed = 1});
   for (std::size_t i = 0; i < problem.num_images(); ++i) {
     Pose& pose = problem.poses[i];
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    const auto t = pose.translation;
-    Vector3<double> centre;
-    for (std::size_t k = 0; k < 3; ++k)
-      centre[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
     const double sign = i % 2 == 0 ? 1 : -1;
-    pose.rotation = normalized(multiply(
-        quaternion_from_angle_axis(Vector3<double>{0.6 * sign, 0.5, -0.4 * sign}), pose.rotation));
-    const Vector3<double> moved = multiply(matrix_from_quaternion(pose.rotation), centre);
-    for (std::size_t k = 0; k < 3; ++k) pose.translation[k] = -moved[k];
+    turn_about_centre(pose, {0.6 * sign, 0.5, -0.4 * sign});
   }
   return problem;
 }

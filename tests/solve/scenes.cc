@@ -12,6 +12,7 @@
 #include "geometry/camera_model.h"
 #include "geometry/rigid_motion.h"
 #include "platform/random.h"
+#include "starts/sights.h"
 
 namespace sheaf {
 namespace {
@@ -168,6 +169,13 @@ double scaled_gradient(const Problem& problem, const Fixed& fixed, std::size_t p
   for (std::size_t i = 0; i < std::min(3 * points, problem.points.size()) && !fixed.points; ++i)
     take([=](Problem& p, double x) { p.points[i] += x; });
   return largest;
+}
+
+void turn_about_centre(Pose& pose, const std::array<double, 3>& by) {
+  const Vector3<double> centre = camera_centre(matrix_from_quaternion(pose.rotation), pose);
+  pose.rotation = normalized(multiply(quaternion_from_angle_axis(by), pose.rotation));
+  const Vector3<double> moved = multiply(matrix_from_quaternion(pose.rotation), centre);
+  for (std::size_t k = 0; k < 3; ++k) pose.translation[k] = -moved[k];
 }
 
 std::string case_file(const std::string& name) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -42,6 +43,9 @@ struct Disturbance {
   std::uint64_t seed = 1;
 };
 void disturb(Problem& problem, const Disturbance& by);
+
+/// Turns a camera by a rotation vector (radians); its centre stays.
+void turn_about_centre(Pose& pose, const std::array<double, 3>& by);
 
 /// A file of tests/data, an input that once failed.
 std::string case_file(const std::string& name);

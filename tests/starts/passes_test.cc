@@ -5,7 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "geometry/rotation.h"
 #include "scene/behind.h"
 #include "solve/lens_problems.h"
 #include "solve/scenes.h"
@@ -60,15 +59,7 @@ TEST(Starts, TurnedAndDistortedImagesAreResected) {
   Estimate lost = good;
   for (std::size_t i = 0; i < lost.poses.size(); ++i) {
     Pose& pose = lost.poses[i];
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    const auto t = pose.translation;
-    Vector3<double> centre;
-    for (std::size_t k = 0; k < 3; ++k)
-      centre[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-    pose.rotation = normalized(multiply(
-        quaternion_from_angle_axis(Vector3<double>{0.5, i % 2 ? 0.7 : -0.7, 0.4}), pose.rotation));
-    const Vector3<double> moved = multiply(matrix_from_quaternion(pose.rotation), centre);
-    for (std::size_t k = 0; k < 3; ++k) pose.translation[k] = -moved[k];
+    turn_about_centre(pose, {0.5, i % 2 ? 0.7 : -0.7, 0.4});
     if (i % 3 == 0) lost.cameras[i].parameters[1] += 50;
   }
   resect(sights, free, {}, never, threads, good);
