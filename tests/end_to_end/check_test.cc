@@ -83,7 +83,8 @@ TEST_F(CheckCommand, ConvertDropsWhatLiesAtACentre) {
     EXPECT_TRUE(says(outcome, "1 at its centre")) << outcome.out;
     EXPECT_EQ(document()["cleaned"]["at_centre"]["count"], 1);
     run({"check", "clean.txt", "--json", "o.json"});
-    for (const json& finding : document()["findings"])
+    const json findings = document()["findings"];
+    for (const json& finding : findings)
       EXPECT_FALSE(finding["grave"].get<bool>()) << finding["words"];
   }
 }
