@@ -11,6 +11,7 @@
 
 #include "sheaf/camera.h"
 #include "sheaf/error.h"
+#include "sheaf/terms.h"
 
 namespace sheaf {
 
@@ -20,11 +21,34 @@ struct Pose {
   std::array<double, 3> translation{0, 0, 0};  ///< t, scene units
 };
 
+/// Cameras that are mounted together and move as one. A *frame* is a moment at which a rig took
+/// images; an image of frame f and sensor s has the pose
+///   cam_from_world = sensor_from_rig[s] o rig_from_world[f].
+/// Where an image has a frame, this is its pose, whatever Problem::poses says.
+struct Rigs {
+  static constexpr std::uint32_t kNone = 0xffffffff;
+
+  std::uint32_t count = 0;                  ///< of rigs
+  std::vector<Pose> sensor_from_rig;        ///< one for each sensor
+  std::vector<std::uint32_t> sensor_rig;    ///< one for each sensor: its rig
+  std::vector<std::uint8_t> is_reference;   ///< one for each sensor: 1 if it is its rig's origin:
+                                            ///< sensor_from_rig is the identity and never moves
+  std::vector<Pose> rig_from_world;         ///< one for each frame
+  std::vector<std::uint32_t> frame_rig;     ///< one for each frame: its rig
+  std::vector<std::uint32_t> image_frame;   ///< one for each image, or empty; kNone: of no rig
+  std::vector<std::uint32_t> image_sensor;  ///< likewise
+
+  std::size_t num_sensors() const { return sensor_from_rig.size(); }
+  std::size_t num_frames() const { return rig_from_world.size(); }
+  /// No image is of a rig.
+  bool empty() const { return image_frame.empty(); }
+};
+
 struct SourceFiles;
 
 /// What a file says of a scene beyond what is solved, kept so that it can be written again; no
-/// solver looks at it. Each list is empty (not known), or has one entry for each image, lens, point
-/// or observation of the problem.
+/// solver looks at it. Each list is empty (not known), or has one entry for each image, lens,
+/// point, observation, rig, frame or sensor of the problem.
 struct SceneMetadata {
   std::vector<std::uint32_t> camera_ids;  ///< as the file numbers lenses
   std::vector<std::uint32_t> image_ids;
@@ -44,6 +68,12 @@ struct SceneMetadata {
   /// (quaternion w, x, y, z of another length) or 9 (matrix, row-major) for each image.
   std::vector<double> stated_rotations;
 
+  std::vector<std::uint32_t> rig_ids;     ///< as the file numbers rigs
+  std::vector<std::uint32_t> frame_ids;   ///< as the file numbers frames
+  std::vector<std::uint32_t> sensor_ids;  ///< of each sensor, the id of its camera in the file
+  /// Images of which the file stated another pose than their frame and sensor give.
+  std::vector<std::uint32_t> stale_poses;
+
   std::uint64_t state_hash = 0;               ///< of the state as read: `state_hash(problem)`
   std::shared_ptr<const SourceFiles> source;  ///< what only the file's own format can hold
 };
@@ -60,6 +90,11 @@ struct Problem {
   std::vector<std::uint32_t> observation_image;
   std::vector<std::uint32_t> observation_point;
   std::vector<double> observation_xy;  ///< 2 x observations, pixels
+  /// Pixels, one for each observation, above 0: residuals are divided by it, so that losses' scales
+  /// and costs count in sigmas. Empty: 1 pixel each.
+  std::vector<double> observation_sigma;
+  Rigs rigs;    ///< which images move as one
+  Terms terms;  ///< what is known beside the observations
 
   /// Rotations as a BAL file stated them (3 per image, angle-axis, radians), or empty. They are
   /// what a writer puts out for each pose whose quaternion is still the one they convert to, so
@@ -84,11 +119,15 @@ struct Problem {
 struct Fixed {
   bool points = false;
   bool poses = false;
-  bool intrinsics = false;                ///< all parameters of all cameras
-  bool f = false;                         ///< focal lengths of all cameras
-  bool k1 = false;                        ///< first radial coefficient of all cameras
-  bool k2 = false;                        ///< second radial coefficient of all cameras
-  std::vector<std::uint32_t> pose_ids;    ///< single poses, by image index
+  bool intrinsics = false;               ///< all parameters of all cameras
+  bool f = false;                        ///< focal lengths of all cameras
+  bool k1 = false;                       ///< first radial coefficient of all cameras
+  bool k2 = false;                       ///< second radial coefficient of all cameras
+  bool sensors = false;                  ///< sensor_from_rig of all rigs
+  std::vector<std::uint32_t> pose_ids;   ///< single poses, by image index; of an image of a rig its
+                                         ///< frame and its sensor
+  std::vector<std::uint32_t> frame_ids;  ///< single frames of rigs, by index
+  std::vector<std::uint32_t> sensor_ids;  ///< single sensors of rigs, by index
   std::vector<std::uint32_t> camera_ids;  ///< single lenses, all their parameters, by camera index
   std::vector<std::uint32_t> k1_ids, k2_ids;  ///< single lenses' first or second coefficient
   /// One set for each camera, or empty: the principal points. What stands above is held besides.
@@ -98,6 +137,12 @@ struct Fixed {
 /// All that `fixed` holds of each camera.
 std::vector<ParameterSet> held_parameters(const Problem& problem, const Fixed& fixed);
 
+/// cam_from_world of an image: of an image of a rig by its frame and sensor, else as it stands.
+Pose pose_of(const Problem& problem, std::size_t image);
+
+/// Writes what frames and sensors say into the poses of the images of rigs.
+void place_images(Problem& problem);
+
 /// Checks sizes, index ranges, finite numbers and unit quaternions (to 1e-6); of the metadata the
 /// sizes. The message names the first offending entry.
 Result<void> validate(const Problem& problem);
@@ -105,7 +150,7 @@ Result<void> validate(const Problem& problem);
 /// Cost 1/2 sum |r|^2 of the plain (not robust) problem by straightforward scalar code, with
 /// compensated summation. Independent of the solver's own evaluation.
 struct Evaluation {
-  double cost = 0;                    ///< 1/2 sum |r|^2, px^2
+  double cost = 0;                    ///< 1/2 sum |r / sigma|^2 of the observations; sigma 1: px^2
   double rms_px = 0;                  ///< sqrt(sum |r|^2 / observations): per observation
   std::vector<std::uint64_t> behind;  ///< observations whose point lies behind the camera, or
                                       ///< beyond what a wide lens's formula is meant for

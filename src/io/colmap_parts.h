@@ -37,11 +37,11 @@ struct RigFrame {
 };
 
 /// What Sheaf looks at of rigs and frames: enough to know that they are whole, and where poses are.
-struct Rigs {
+struct ColmapRigs {
   std::vector<std::array<std::uint32_t, 2>> references;  ///< rig id, id of its reference camera
   std::vector<RigFrame> frames;
 };
-Result<Rigs> parse_rigs(const ColmapFiles& files);
+Result<ColmapRigs> parse_rigs(const ColmapFiles& files);
 
 /// The frames of a model whose poses changed: each has the pose of its one image. Nothing where
 /// some frame has several, or one that is not its rig's reference: then no pose of the frame

@@ -31,7 +31,7 @@ bool is_there(const fs::path& path) {
 }
 
 /// Every frame's images are those of the model, and every image is in a frame.
-std::optional<Error> check_frames(const ColmapFiles& files, const Rigs& rigs,
+std::optional<Error> check_frames(const ColmapFiles& files, const ColmapRigs& rigs,
                                   const SceneMetadata& metadata) {
   if (files.frames.empty()) return {};
   const std::unordered_set<std::uint64_t> ids(metadata.image_ids.begin(), metadata.image_ids.end());
@@ -97,7 +97,7 @@ Result<Problem> parse_colmap(const ColmapFiles& files) {
   if (auto e = images(files.images, files.name("images"), draft)) return *e;
   if (auto e = points(files.points, files.name("points3D"), draft)) return *e;
   if (auto e = check_features(files, draft)) return *e;
-  const Result<Rigs> rigs = parse_rigs(files);
+  const Result<ColmapRigs> rigs = parse_rigs(files);
   if (!rigs.ok()) return rigs.error();
   if (auto e = check_frames(files, rigs.value(), draft.metadata())) return *e;
   SourceFiles source;

@@ -20,7 +20,7 @@ bool read_sensor(ByteCursor& in, std::int32_t& type, std::uint32_t& id) {
   return in.read(type) && in.read(id);
 }
 
-std::optional<Error> read_rigs_binary(const ColmapFiles& files, Rigs& rigs) {
+std::optional<Error> read_rigs_binary(const ColmapFiles& files, ColmapRigs& rigs) {
   ByteCursor in(files.rigs, files.name("rigs"));
   std::uint64_t count;
   if (auto e = in.read_count("rigs", kLeastRig, count)) return e;
@@ -48,7 +48,7 @@ std::optional<Error> read_rigs_binary(const ColmapFiles& files, Rigs& rigs) {
   return in.check_end();
 }
 
-std::optional<Error> read_frames_binary(const ColmapFiles& files, Rigs& rigs) {
+std::optional<Error> read_frames_binary(const ColmapFiles& files, ColmapRigs& rigs) {
   ByteCursor in(files.frames, files.name("frames"));
   std::uint64_t count;
   if (auto e = in.read_count("frames", kLeastFrame, count)) return e;
@@ -77,7 +77,7 @@ std::optional<Error> read_frames_binary(const ColmapFiles& files, Rigs& rigs) {
   return in.check_end();
 }
 
-std::optional<Error> read_rigs_text(const ColmapFiles& files, Rigs& rigs) {
+std::optional<Error> read_rigs_text(const ColmapFiles& files, ColmapRigs& rigs) {
   LineCursor in(files.rigs, files.name("rigs"));
   while (in.next_record()) {
     std::uint32_t id, sensors, sensor = 0;
@@ -103,7 +103,7 @@ std::optional<Error> read_rigs_text(const ColmapFiles& files, Rigs& rigs) {
   return {};
 }
 
-std::optional<Error> read_frames_text(const ColmapFiles& files, Rigs& rigs) {
+std::optional<Error> read_frames_text(const ColmapFiles& files, ColmapRigs& rigs) {
   LineCursor in(files.frames, files.name("frames"));
   while (in.next_record()) {
     RigFrame frame;
@@ -154,8 +154,8 @@ std::string pose_bytes(const Pose& pose, bool text) {
 
 }  // namespace
 
-Result<Rigs> parse_rigs(const ColmapFiles& files) {
-  Rigs rigs;
+Result<ColmapRigs> parse_rigs(const ColmapFiles& files) {
+  ColmapRigs rigs;
   if (!files.rigs.empty())
     if (auto e = files.text ? read_rigs_text(files, rigs) : read_rigs_binary(files, rigs))
       return *e;
@@ -166,7 +166,7 @@ Result<Rigs> parse_rigs(const ColmapFiles& files) {
 }
 
 std::vector<std::string> notes_on(const ColmapFiles& files) {
-  const Result<Rigs> rigs = parse_rigs(files);
+  const Result<ColmapRigs> rigs = parse_rigs(files);
   if (!rigs.ok()) return {};
   const auto& frames = rigs.value().frames;
   const auto several = std::count_if(frames.begin(), frames.end(),
@@ -178,7 +178,7 @@ std::vector<std::string> notes_on(const ColmapFiles& files) {
 }
 
 std::optional<std::string> frames_with_poses(const ColmapFiles& files, const Problem& problem) {
-  const Result<Rigs> rigs = parse_rigs(files);
+  const Result<ColmapRigs> rigs = parse_rigs(files);
   if (!rigs.ok()) return {};
   std::map<std::uint32_t, std::uint32_t> reference;
   for (const auto& [rig, camera] : rigs.value().references) reference[rig] = camera;

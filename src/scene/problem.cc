@@ -8,6 +8,8 @@
 
 #include "geometry/camera_model.h"
 #include "geometry/rotation.h"
+#include "scene/rigs.h"
+#include "scene/terms.h"
 
 namespace sheaf {
 
@@ -54,6 +56,8 @@ Result<void> validate_sizes(const Problem& p) {
         std::to_string(p.observation_xy.size()) + " coordinates");
   if (!p.bal_angle_axis.empty() && p.bal_angle_axis.size() != 3 * p.num_images())
     return invalid("bal_angle_axis must be empty or hold three numbers for each image");
+  if (!p.observation_sigma.empty() && p.observation_sigma.size() != p.num_observations())
+    return invalid("observation_sigma must be empty or have one entry for each observation");
   if (p.num_images() >= UINT32_MAX || p.num_points() >= UINT32_MAX)
     return invalid("more than 2^32 - 2 images or points");
   return {};
@@ -94,6 +98,19 @@ Result<void> validate_observations(const Problem& p) {
     if (!std::isfinite(p.observation_xy[2 * i]) || !std::isfinite(p.observation_xy[2 * i + 1]))
       return invalid(numbered("observation", i) + ": the pixel is not finite");
   }
+  for (std::size_t i = 0; i < p.observation_sigma.size(); ++i)
+    if (!(p.observation_sigma[i] > 0) || !std::isfinite(p.observation_sigma[i]))
+      return invalid(numbered("observation", i) + ": the sigma is not a finite number above 0");
+  return {};
+}
+
+Result<void> validate_rigs(const Problem& p) {
+  if (const auto wrong = wrong_rigs(p)) return invalid(*wrong);
+  return {};
+}
+
+Result<void> validate_terms(const Problem& p) {
+  if (const auto wrong = wrong_terms(p)) return invalid(*wrong);
   return {};
 }
 
@@ -136,8 +153,8 @@ struct CompensatedSum {
 }  // namespace
 
 Result<void> validate(const Problem& problem) {
-  for (const auto& check :
-       {validate_sizes, validate_images, validate_observations, validate_metadata})
+  for (const auto& check : {validate_sizes, validate_images, validate_observations, validate_rigs,
+                            validate_terms, validate_metadata})
     if (Result<void> result = check(problem); !result.ok()) return result;
   return {};
 }
@@ -145,15 +162,19 @@ Result<void> validate(const Problem& problem) {
 Evaluation evaluate(const Problem& problem) {
   std::vector<Matrix3<double>> rotations;
   rotations.reserve(problem.num_images());
-  for (const Pose& pose : problem.poses) rotations.push_back(matrix_from_quaternion(pose.rotation));
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < problem.num_images(); ++i) {
+    poses.push_back(pose_of(problem, i));
+    rotations.push_back(matrix_from_quaternion(poses.back().rotation));
+  }
 
   Evaluation out;
-  CompensatedSum sum;
+  CompensatedSum sum, weighted;
   std::size_t finite = 0;
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
     const std::uint32_t image = problem.observation_image[i];
     const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
-    const auto& t = problem.poses[image].translation;
+    const auto& t = poses[image].translation;
     Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
     for (int j = 0; j < 3; ++j) P[j] += t[j];
     const Projected u = project(problem.cameras[problem.image_camera[image]], P);
@@ -166,9 +187,11 @@ Evaluation evaluate(const Problem& problem) {
       continue;
     }
     sum.add(square);
+    const double sigma = problem.observation_sigma.empty() ? 1 : problem.observation_sigma[i];
+    weighted.add(square / (sigma * sigma));
     ++finite;
   }
-  out.cost = sum.value() / 2;
+  out.cost = weighted.value() / 2;
   out.rms_px = finite > 0 ? std::sqrt(sum.value() / static_cast<double>(finite)) : 0;
   return out;
 }
@@ -207,9 +230,14 @@ std::uint64_t state_hash(const Problem& problem) {
     mix(static_cast<std::uint64_t>(camera.model)), add(camera.parameters);
   add(problem.points);
   add(problem.observation_xy);
+  add(problem.observation_sigma);
+  for (const auto* motions : {&problem.rigs.sensor_from_rig, &problem.rigs.rig_from_world})
+    for (const Pose& pose : *motions) add(pose.rotation), add(pose.translation);
   for (const std::uint32_t i : problem.image_camera) mix(i);
   for (const std::uint32_t i : problem.observation_image) mix(i);
   for (const std::uint32_t i : problem.observation_point) mix(i);
+  for (const auto* indices : {&problem.rigs.image_frame, &problem.rigs.image_sensor})
+    for (const std::uint32_t i : *indices) mix(i);
   return hash;
 }
 

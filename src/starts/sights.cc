@@ -26,13 +26,16 @@ void sort_by(const std::vector<std::uint32_t>& key, std::size_t keys,
 }  // namespace
 
 Estimate estimate_of(const Problem& problem) {
-  return {problem.poses, problem.cameras, problem.points};
+  return {problem.poses, problem.cameras, problem.points, problem.rigs.sensor_from_rig,
+          problem.rigs.rig_from_world};
 }
 
 void put(const Estimate& state, Problem& problem) {
   problem.poses = state.poses;
   problem.cameras = state.cameras;
   problem.points = state.points;
+  problem.rigs.sensor_from_rig = state.sensors;
+  problem.rigs.rig_from_world = state.frames;
 }
 
 Sights::Sights(const Problem& problem, const std::vector<std::uint8_t>& skip) : problem_(&problem) {

@@ -18,6 +18,7 @@ struct Estimate {
   std::vector<Pose> poses;
   std::vector<Camera> cameras;
   std::vector<double> points;  ///< 3 for each
+  std::vector<Pose> sensors{}, frames{};  ///< of rigs
 };
 Estimate estimate_of(const Problem& problem);
 void put(const Estimate& state, Problem& problem);

@@ -1,0 +1,84 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sheaf/loss.h"
+
+namespace sheaf {
+
+/// A symmetric 3x3 covariance, row-major, in squared units of what it is the covariance of. It must
+/// be positive definite.
+using Covariance3 = std::array<double, 9>;
+inline constexpr Covariance3 kUnitCovariance3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/// The loss of a term. Its scale counts in sigmas, as the term's residuals do, and is never
+/// estimated.
+struct TermLoss {
+  LossKind kind = LossKind::none;
+  double scale = 1;
+};
+
+/// The centre of a camera, -R^T t, was measured: cost 1/2 rho(e^T C^-1 e), e = centre - position.
+struct CentrePrior {
+  std::uint32_t image = 0;
+  std::array<double, 3> position{};           ///< world, scene units
+  Covariance3 covariance = kUnitCovariance3;  ///< scene units squared
+  TermLoss loss{};
+};
+
+/// A point was measured: cost 1/2 e^T C^-1 e, e = point - position. It has no loss: it is a part of
+/// the point's own 3x3 system, which is eliminated.
+struct PointPrior {
+  std::uint32_t point = 0;
+  std::array<double, 3> position{};           ///< world, scene units
+  Covariance3 covariance = kUnitCovariance3;  ///< scene units squared
+};
+
+/// The distance between two points was measured: cost 1/2 rho(((|a - b| - distance) / sigma)^2).
+/// Both points are kept, as Terms::kept_points says.
+struct DistancePrior {
+  std::uint32_t first = 0, second = 0;  ///< points
+  double distance = 0, sigma = 1;       ///< scene units
+  TermLoss loss{};
+};
+
+/// A Gaussian over several blocks at once, such as marginalisation leaves: cost
+/// 1/2 |S (d - mean)|^2 with d the blocks' differences from a state, stacked: of a pose (rho, phi),
+/// the six numbers of log(pose state^-1), of a camera its parameters, of a kept point X, Y, Z.
+struct GaussianPrior {
+  struct Block {
+    enum class Kind : std::uint8_t { pose, camera, point } kind = Kind::pose;
+    std::uint32_t index = 0;  ///< of the image, the camera or the kept point
+    /// The state: of a pose its quaternion (w, x, y, z) and translation, of a camera its
+    /// parameters, of a point X, Y, Z.
+    std::vector<double> state;
+  };
+  std::vector<Block> blocks;
+  std::vector<double> square_root;  ///< S: rows x columns, row-major; columns: the blocks' together
+  std::vector<double> mean;         ///< one for each column; empty: 0
+  TermLoss loss{};
+};
+
+/// What a problem knows beside observations: rows without a point (terms), rows on a point alone,
+/// and the few points that are not eliminated because terms tie them. Costs count in sigmas.
+struct Terms {
+  std::vector<CentrePrior> centres;
+  std::vector<PointPrior> points;
+  std::vector<DistancePrior> distances;
+  std::vector<GaussianPrior> gaussians;
+  /// Points that are columns of the camera system beside the images: hundreds, not thousands. Those
+  /// that `distances` and `gaussians` name are kept whether they stand here or not.
+  std::vector<std::uint32_t> kept_points;
+
+  bool empty() const {
+    return centres.empty() && points.empty() && distances.empty() && gaussians.empty() &&
+           kept_points.empty();
+  }
+};
+
+}  // namespace sheaf

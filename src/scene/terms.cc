@@ -1,0 +1,138 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/terms.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/camera_model.h"
+
+namespace sheaf {
+namespace {
+
+using Kind = GaussianPrior::Block::Kind;
+
+bool finite(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+}
+
+std::optional<std::string> wrong_position(const std::array<double, 3>& position,
+                                          const Covariance3& covariance, const TermLoss& loss) {
+  if (!finite({position.begin(), position.end()})) return "the position is not finite";
+  if (!whitening(covariance)) return "the covariance is not symmetric and positive definite";
+  if (loss.kind != LossKind::none && !(loss.scale > 0)) return "the loss needs a scale above 0";
+  return {};
+}
+
+std::size_t columns_of(const Problem& problem, const GaussianPrior::Block& block) {
+  switch (block.kind) {
+    case Kind::pose:
+      return 6;
+    case Kind::camera:
+      return parameter_count(problem.cameras[block.index].model);
+    case Kind::point:
+      return 3;
+  }
+  return 0;
+}
+
+std::optional<std::string> wrong_block(const Problem& problem, const GaussianPrior::Block& block) {
+  const std::size_t count = block.kind == Kind::pose     ? problem.num_images()
+                            : block.kind == Kind::camera ? problem.cameras.size()
+                                                         : problem.num_points();
+  if (block.index >= count)
+    return "a block names entry " + std::to_string(block.index) + " of " + std::to_string(count);
+  const std::size_t state = block.kind == Kind::pose ? 7 : columns_of(problem, block);
+  if (block.state.size() != state || !finite(block.state))
+    return "a block's state must be " + std::to_string(state) + " finite numbers";
+  return {};
+}
+
+std::optional<std::string> wrong_gaussian(const Problem& problem, const GaussianPrior& prior) {
+  std::size_t columns = 0;
+  for (const GaussianPrior::Block& block : prior.blocks) {
+    if (auto wrong = wrong_block(problem, block)) return wrong;
+    columns += columns_of(problem, block);
+  }
+  if (columns == 0 || prior.square_root.empty() || prior.square_root.size() % columns != 0)
+    return "square_root must have rows of " + std::to_string(columns) + " columns";
+  if (!prior.mean.empty() && prior.mean.size() != columns)
+    return "mean must be empty or have " + std::to_string(columns) + " entries";
+  if (!finite(prior.square_root) || !finite(prior.mean)) return "a number is not finite";
+  if (prior.loss.kind != LossKind::none && !(prior.loss.scale > 0))
+    return "the loss needs a scale above 0";
+  return {};
+}
+
+template <class Term>
+std::string at(const char* what, const std::vector<Term>& all, const Term& term,
+               const std::string& wrong) {
+  return std::string(what) + " " + std::to_string(&term - all.data()) + ": " + wrong;
+}
+
+}  // namespace
+
+std::optional<std::array<double, 9>> whitening(const Covariance3& C) {
+  for (const double x : C)
+    if (!std::isfinite(x)) return {};
+  for (const auto& [a, b] : {std::pair{1, 3}, {2, 6}, {5, 7}})
+    if (std::abs(C[a] - C[b]) > 1e-12 * (std::abs(C[a]) + std::abs(C[b]))) return {};
+  // C = R R^T with R upper triangular, so that U = R^-1 is upper triangular too.
+  const double r22 = std::sqrt(C[8]);
+  const double r12 = C[5] / r22, r02 = C[2] / r22;
+  const double r11 = std::sqrt(C[4] - r12 * r12);
+  const double r01 = (C[1] - r02 * r12) / r11;
+  const double r00 = std::sqrt(C[0] - r01 * r01 - r02 * r02);
+  if (!(r00 > 0) || !(r11 > 0) || !(r22 > 0)) return {};
+  const double u01 = -r01 / (r00 * r11), u12 = -r12 / (r11 * r22);
+  const double u02 = (r01 * r12 / r11 - r02) / (r00 * r22);
+  return std::array<double, 9>{1 / r00, u01, u02, 0, 1 / r11, u12, 0, 0, 1 / r22};
+}
+
+std::vector<std::uint32_t> kept_points(const Terms& terms) {
+  std::vector<std::uint32_t> kept = terms.kept_points;
+  for (const DistancePrior& of : terms.distances) kept.insert(kept.end(), {of.first, of.second});
+  for (const GaussianPrior& of : terms.gaussians)
+    for (const GaussianPrior::Block& block : of.blocks)
+      if (block.kind == Kind::point) kept.push_back(block.index);
+  std::sort(kept.begin(), kept.end());
+  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+  return kept;
+}
+
+std::optional<std::string> wrong_terms(const Problem& problem) {
+  const Terms& terms = problem.terms;
+  for (const CentrePrior& of : terms.centres) {
+    auto wrong = wrong_position(of.position, of.covariance, of.loss);
+    if (of.image >= problem.num_images()) wrong = "it names an image that there is not";
+    if (wrong) return at("centre prior", terms.centres, of, *wrong);
+  }
+  for (const PointPrior& of : terms.points) {
+    auto wrong = wrong_position(of.position, of.covariance, {});
+    if (of.point >= problem.num_points()) wrong = "it names a point that there is not";
+    if (wrong) return at("point prior", terms.points, of, *wrong);
+  }
+  for (const DistancePrior& of : terms.distances) {
+    std::optional<std::string> wrong;
+    if (of.first >= problem.num_points() || of.second >= problem.num_points())
+      wrong = "it names a point that there is not";
+    else if (of.first == of.second)
+      wrong = "both ends are the same point";
+    else if (!(of.sigma > 0) || !std::isfinite(of.sigma) || !(of.distance >= 0) ||
+             !std::isfinite(of.distance))
+      wrong = "the distance must be finite and at least 0, its sigma finite and above 0";
+    else if (of.loss.kind != LossKind::none && !(of.loss.scale > 0))
+      wrong = "the loss needs a scale above 0";
+    if (wrong) return at("distance", terms.distances, of, *wrong);
+  }
+  for (const GaussianPrior& of : terms.gaussians)
+    if (const auto wrong = wrong_gaussian(problem, of))
+      return at("Gaussian", terms.gaussians, of, *wrong);
+  for (const std::uint32_t point : terms.kept_points)
+    if (point >= problem.num_points())
+      return "kept point " + std::to_string(point) + " is not one of the " +
+             std::to_string(problem.num_points()) + " points";
+  return {};
+}
+
+}  // namespace sheaf
