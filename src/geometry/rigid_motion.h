@@ -13,6 +13,14 @@ struct RigidMotion {
   Vector3<Scalar> translation{};
 };
 
+/// a o b: X -> a(b(X)).
+template <class Scalar>
+RigidMotion<Scalar> composed(const RigidMotion<Scalar>& a, const RigidMotion<Scalar>& b) {
+  const Vector3<Scalar> t = multiply(matrix_from_quaternion(a.rotation), b.translation);
+  return {normalized(multiply(a.rotation, b.rotation)),
+          {t[0] + a.translation[0], t[1] + a.translation[1], t[2] + a.translation[2]}};
+}
+
 /// V(phi) rho with V = I + (1 - cos a)/a^2 [phi] + (a - sin a)/a^3 [phi]^2, a = |phi|: the
 /// translation of exp([rho, phi]^) on SE(3). Series below a = 1e-2 (error < 1e-17 relative).
 template <class Scalar>

@@ -55,11 +55,9 @@ std::optional<std::string> wrong_sensors(const Rigs& rigs) {
 
 Pose pose_in_rig(const Pose& sensor, const Pose& frame) {
   if (is_identity(sensor)) return frame;
-  Pose out;
-  out.rotation = normalized(multiply(sensor.rotation, frame.rotation));
-  const Vector3<double> t = multiply(matrix_from_quaternion(sensor.rotation), frame.translation);
-  for (std::size_t k = 0; k < 3; ++k) out.translation[k] = t[k] + sensor.translation[k];
-  return out;
+  const RigidMotion<double> image =
+      composed<double>({sensor.rotation, sensor.translation}, {frame.rotation, frame.translation});
+  return {image.rotation, image.translation};
 }
 
 Pose frame_from_image(const Pose& sensor, const Pose& image) {

@@ -14,6 +14,7 @@
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "scene/behind.h"
+#include "scene/rigs.h"
 #include "solve/endings.h"
 #include "solve/loss_rounds.h"
 #include "solve/recovery.h"
@@ -30,6 +31,14 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
     if (i >= problem.num_images())
       return usage("fixed pose " + std::to_string(i) + " is not one of the " +
                    std::to_string(problem.num_images()) + " images");
+  for (std::uint32_t f : options.fixed.frame_ids)
+    if (f >= problem.rigs.num_frames())
+      return usage("fixed frame " + std::to_string(f) + " is not one of the " +
+                   std::to_string(problem.rigs.num_frames()) + " frames");
+  for (std::uint32_t s : options.fixed.sensor_ids)
+    if (s >= problem.rigs.num_sensors())
+      return usage("fixed sensor " + std::to_string(s) + " is not one of the " +
+                   std::to_string(problem.rigs.num_sensors()) + " sensors");
   for (const auto* ids : {&options.fixed.camera_ids, &options.fixed.k1_ids, &options.fixed.k2_ids})
     for (std::uint32_t i : *ids)
       if (i >= problem.cameras.size())
@@ -182,7 +191,9 @@ class Attempts {
   Recourse find_better(const Build& build, const Home& home) {
     // A state that fits to a twentieth of a pixel is not far from anything.
     const bool near = rms(summary_.iterations.back().cost, used_) < 0.05;
-    if (options_.recoveries == 0 || near || steps_of(summary_) >= options_.max_iterations)
+    // Starts move images one by one.
+    const bool rigid = has_rigid_frames(problem_.rigs);
+    if (options_.recoveries == 0 || near || rigid || steps_of(summary_) >= options_.max_iterations)
       return Recourse::none;
     --options_.recoveries;
     start_ = estimate_of(problem_);
@@ -281,6 +292,7 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
   if (!kernels.ok()) return kernels.error();
 
   Summary summary;
+  place_images(problem);
   try {
     Attempts attempts(problem, options, *kernels.value(), clock, summary);
     const Result<void> done = attempts.run();

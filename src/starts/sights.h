@@ -17,7 +17,7 @@ namespace sheaf {
 struct Estimate {
   std::vector<Pose> poses;
   std::vector<Camera> cameras;
-  std::vector<double> points;  ///< 3 for each
+  std::vector<double> points;             ///< 3 for each
   std::vector<Pose> sensors{}, frames{};  ///< of rigs
 };
 Estimate estimate_of(const Problem& problem);

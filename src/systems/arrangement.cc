@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "scene/rigs.h"
+
 namespace sheaf {
 
 Result<Arrangement> arrange_with_lenses(const Problem& problem, const Fixed& fixed,
@@ -16,8 +18,9 @@ Result<Arrangement> arrange_with_lenses(const Problem& problem, const Fixed& fix
                                        " times; with these camera models and lenses, at most " +
                                        std::to_string(Chunks::kLongestTrack) +
                                        " observations and lenses of one point can be solved for");
-  out.columns = number_lens_columns(out.tracks, fixed);
+  out.columns = number_lens_columns(out.tracks, fixed_images(problem, fixed));
   out.coarse_columns = image_columns(out.tracks, out.columns, false);
+  if (has_rigid_frames(problem.rigs)) out.map = map_rigs(problem, fixed, out.columns);
   return out;
 }
 

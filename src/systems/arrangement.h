@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "lists/batches.h"
+#include "lists/block_map.h"
 #include "lists/columns.h"
 #include "lists/lens_chunks.h"
 #include "lists/lens_tracks.h"
@@ -20,6 +23,13 @@ struct Arrangement {
   Columns columns;         ///< of the images' blocks, and of the lenses' own blocks behind them
   Columns coarse_columns;  ///< of lens rows the images' poses alone: what the coarse space moves
   LensChunks lists;        ///< of BAL rows the chunks alone
+  std::optional<BlockMap> map;  ///< of the images' blocks to what is solved for, where these differ
+
+  /// Columns that are solved for, and those that the coarse space moves.
+  const Columns& solved_columns() const { return map ? map->columns : columns; }
+  const Columns& solved_coarse_columns() const {
+    return map ? map->coarse_columns : coarse_columns.of_image.empty() ? columns : coarse_columns;
+  }
 };
 
 /// Of a problem with lenses of any model, before lists are cut. Errors: usage, a track is too long.

@@ -28,9 +28,12 @@ void BalOperator::apply(const double* x, double* y) {
             });
 }
 
-void BalDogleg::write_step(std::size_t image, const double* x) {
-  double* record = state_.record(image);
-  camera_record::write_step(record + camera_record::kFocal, x, record + camera_record::kStep);
+void BalDogleg::write_steps(const double* x, std::size_t images) {
+  for (std::size_t i = 0; i < images; ++i) {
+    double* record = state_.record(i);
+    camera_record::write_step(record + camera_record::kFocal, x + kImageVector * i,
+                              record + camera_record::kStep);
+  }
 }
 
 FloatBalOperator::FloatBalOperator(const Columns& columns, const BalState& state,

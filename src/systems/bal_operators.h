@@ -79,7 +79,7 @@ class BalDogleg : public DoglegSource {
   BalDogleg(const BalState& state, const Kernels& kernels)
       : state_(state), kernels_(dogleg_kernels(kernels.name)) {}
 
-  void write_step(std::size_t image, const double* x) override;
+  void write_steps(const double* x, std::size_t images) override;
   void gradient(const Chunk& chunk, double* sums) override {
     kernels_.gradient(state_.input(), chunk, sums);
   }

@@ -104,12 +104,12 @@ std::uint64_t BalRows::count_behind() const {
   return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
 }
 
-std::unique_ptr<CameraSolver> BalRows::make_implicit(const Columns& columns, bool mixed) {
+PointRows::Operators BalRows::make_operators(const Columns& columns, bool mixed) {
   auto exact = std::make_unique<BalOperator>(columns, held_state(), kernels_, threads_);
   std::unique_ptr<StateOperator> rounded;
   if (mixed)
     rounded = std::make_unique<FloatBalOperator>(columns, held_state(), kernels_, exact->sums());
-  return make_implicit_solver(columns, std::move(exact), std::move(rounded), threads_);
+  return {std::move(exact), std::move(rounded)};
 }
 
 }  // namespace sheaf

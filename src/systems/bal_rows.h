@@ -32,7 +32,7 @@ class BalRows : public PointRows {
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
   std::uint64_t count_behind() const override;
-  std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
+  Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override {
     return std::make_unique<BalDogleg>(held_state(), kernels_);
   }

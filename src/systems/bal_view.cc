@@ -6,8 +6,27 @@
 
 #include "geometry/camera_model.h"
 #include "platform/parallel.h"
+#include "scene/rigs.h"
 
 namespace sheaf {
+
+namespace {
+
+/// Whether the images of each sensor are of BAL's model, or none is: the sensor is turned with
+/// them.
+bool sensors_agree(const Problem& problem) {
+  std::vector<std::int8_t> turns(problem.rigs.num_sensors(), -1);
+  for (std::size_t i = 0; i < problem.rigs.image_sensor.size(); ++i) {
+    if (!in_rig(problem.rigs, i)) continue;
+    const bool bal = problem.cameras[problem.image_camera[i]].model == CameraModel::bal;
+    std::int8_t& of = turns[problem.rigs.image_sensor[i]];
+    if (of >= 0 && of != (bal ? 0 : 1)) return false;
+    of = bal ? 0 : 1;
+  }
+  return true;
+}
+
+}  // namespace
 
 bool BalView::serves(const Problem& problem, const Fixed& fixed) {
   const std::vector<ParameterSet> held = held_parameters(problem, fixed);
@@ -16,11 +35,14 @@ bool BalView::serves(const Problem& problem, const Fixed& fixed) {
     const ParameterSet principal = principal_point(problem.cameras[c].model);
     if (!view || !view->refinable || (held[c] & principal) != principal) return false;
   }
-  return true;
+  return sensors_agree(problem);
 }
 
 BalView::BalView(const Problem& problem, const Fixed& fixed)
     : turns_(!has_only_bal_cameras(problem)), held_(held_parameters(problem, fixed)) {
+  sensor_turns_.assign(problem.rigs.num_sensors(), 0);
+  for (std::size_t i = 0; i < problem.rigs.image_sensor.size(); ++i)
+    if (in_rig(problem.rigs, i)) sensor_turns_[problem.rigs.image_sensor[i]] = turns(problem, i);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     views_.push_back(*radial_view(problem.cameras[c]));
     const ParameterRoles role = roles_of(problem.cameras[c].model);
@@ -46,6 +68,13 @@ CameraState BalView::cameras(const Problem& problem) const {
     if (turns(problem, i)) turn_round(pose, false);
     out.poses.push_back({pose.rotation, pose.translation});
   }
+  for (std::size_t s = 0; s < problem.rigs.num_sensors(); ++s) {
+    Pose pose = problem.rigs.sensor_from_rig[s];
+    if (sensor_turns_[s] != 0) turn_round(pose, false);
+    out.sensors.push_back({pose.rotation, pose.translation});
+  }
+  for (const Pose& pose : problem.rigs.rig_from_world)
+    out.frames.push_back({pose.rotation, pose.translation});
   for (const RadialView& view : views_) out.sets.push_back({view.f, view.k1, view.k2});
   return out;
 }
@@ -92,6 +121,13 @@ void BalView::store(const CameraState& cameras, Problem& problem) const {
     pose.translation = cameras.poses[i].translation;
     if (turns(problem, i)) turn_round(pose, true);
   }
+  for (std::size_t s = 0; s < problem.rigs.num_sensors(); ++s) {
+    Pose& pose = problem.rigs.sensor_from_rig[s];
+    pose = {cameras.sensors[s].rotation, cameras.sensors[s].translation};
+    if (sensor_turns_[s] != 0) turn_round(pose, true);
+  }
+  for (std::size_t f = 0; f < problem.rigs.num_frames(); ++f)
+    problem.rigs.rig_from_world[f] = {cameras.frames[f].rotation, cameras.frames[f].translation};
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     Camera& camera = problem.cameras[c];
     const CameraState::Parameters& refined = cameras.sets[c];

@@ -40,7 +40,8 @@ class BalView {
   bool turns(const Problem& problem, std::size_t image) const;
 
   bool turns_ = false;
-  std::vector<RadialView> views_;  ///< of each camera
+  std::vector<std::uint8_t> sensor_turns_;  ///< of each sensor of rigs
+  std::vector<RadialView> views_;           ///< of each camera
   std::vector<ParameterSet> held_;
 };
 

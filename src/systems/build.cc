@@ -7,9 +7,11 @@
 
 #include "eliminate/kernel_table.h"
 #include "platform/memory.h"
+#include "scene/rigs.h"
 #include "systems/bal_rows.h"
 #include "systems/image_system.h"
 #include "systems/lens_rows.h"
+#include "systems/mapped_rows.h"
 #include "systems/point_system.h"
 
 namespace sheaf {
@@ -85,9 +87,9 @@ Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
 }
 
 Result<void> Build::plan_bal(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  Columns columns = number_columns(problem, options_.fixed, view_->held());
-  const bool only_images = options_.fixed.points && !columns.lens_shared &&
-                           options_.trust_region == TrustRegion::lm &&
+  Columns columns = number_columns(problem, fixed_images(problem, options_.fixed), view_->held());
+  const bool only_images = options_.fixed.points && !has_rigid_frames(problem.rigs) &&
+                           !columns.lens_shared && options_.trust_region == TrustRegion::lm &&
                            options_.solver == CameraSolverKind::automatic;
   return only_images ? plan_images(problem, skip, std::move(columns))
                      : plan_points(problem, skip, std::move(columns));
@@ -112,8 +114,12 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
   const bool held = options_.fixed.points;
   Batches batches = arrange(problem, skip, *threads_);
   view_->turn(problem, batches, *threads_);
+  arranged_ = std::make_unique<Arrangement>();
+  if (has_rigid_frames(problem.rigs))
+    arranged_->map = map_rigs(problem, options_.fixed, columns, view_->turns());
   Clusters clusters;
-  WorkCounts counts = count_work(batches, columns, held, clusters, *threads_);
+  WorkCounts counts = count_work(batches, columns, arranged_->map ? &*arranged_->map : nullptr,
+                                 held, clusters, *threads_);
   counts.weighted = options_.loss.kind != LossKind::none;
   counts.dogleg = options_.trust_region == TrustRegion::dogleg;
   lends_ = lends_observations(problem, batches, options_, *threads_);
@@ -123,7 +129,6 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
   if (!choice.ok()) return choice.error();
   choice_ = std::move(choice).value();
   choice_.plan.clusters = std::move(clusters);
-  arranged_ = std::make_unique<Arrangement>();
   arranged_->batches = std::move(batches);
   arranged_->columns = std::move(columns);
   return {};
@@ -165,11 +170,18 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
     rows = std::make_unique<BalRows>(*arranged_, problem.image_camera, kernels, *threads_);
   else
     rows = std::make_unique<LensRows>(*arranged_, kernels, *threads_);
+  if (arranged_->map) {
+    const SolverKind kind = choice_.plan.kind;
+    const bool forms = kind != SolverKind::implicit_cg && kind != SolverKind::blocks;
+    rows =
+        std::make_unique<MappedRows>(std::move(rows), columns, *arranged_->map, forms, *threads_);
+    camera_columns = camera_columns.through(*arranged_->map, problem.rigs);
+  }
   return std::make_unique<PointSystem>(
       std::move(rows),
       PointSystem::Start{cameras(problem), std::move(camera_columns), &problem.points},
-      PointSystem::Numbering{&columns, view_ ? &columns : &arranged_->coarse_columns}, rules,
-      choice_.plan, kernels, *threads_);
+      PointSystem::Numbering{&arranged_->solved_columns(), &arranged_->solved_coarse_columns()},
+      rules, choice_.plan, kernels, *threads_);
 }
 
 void Build::store(const Home& home, Problem& problem) const {
@@ -178,6 +190,8 @@ void Build::store(const Home& home, Problem& problem) const {
   else
     sheaf::store(home.cameras(), problem);
   home.store_points(problem.points);
+  follow_images(problem);
+  place_images(problem);
 }
 
 }  // namespace sheaf

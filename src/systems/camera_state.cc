@@ -22,6 +22,10 @@ CameraState camera_state(const Problem& problem) {
   for (const Pose& pose : problem.poses) out.poses.push_back({pose.rotation, pose.translation});
   out.sets.reserve(problem.cameras.size());
   for (const Camera& camera : problem.cameras) out.sets.push_back(camera.parameters);
+  for (const Pose& pose : problem.rigs.sensor_from_rig)
+    out.sensors.push_back({pose.rotation, pose.translation});
+  for (const Pose& pose : problem.rigs.rig_from_world)
+    out.frames.push_back({pose.rotation, pose.translation});
   return out;
 }
 
@@ -51,6 +55,10 @@ void store(const CameraState& state, Problem& problem) {
     problem.poses[i].translation = state.poses[i].translation;
   }
   for (std::size_t c = 0; c < state.sets.size(); ++c) problem.cameras[c].parameters = state.sets[c];
+  for (std::size_t s = 0; s < state.sensors.size(); ++s)
+    problem.rigs.sensor_from_rig[s] = {state.sensors[s].rotation, state.sensors[s].translation};
+  for (std::size_t f = 0; f < state.frames.size(); ++f)
+    problem.rigs.rig_from_world[f] = {state.frames[f].rotation, state.frames[f].translation};
 }
 
 CameraColumns::CameraColumns(const Columns& columns, std::size_t images) : poses_(images) {
@@ -110,21 +118,58 @@ CameraColumns CameraColumns::of_brightness(const Columns& columns) {
   return out;
 }
 
-double CameraColumns::step(const CameraState& from, const Buffer<double>& x,
-                           CameraState& to) const {
+CameraColumns CameraColumns::through(const BlockMap& map, const Rigs& rigs) const {
+  const auto columns_of = [&](std::uint32_t block) {
+    std::array<std::int32_t, 6> out;
+    out.fill(Columns::kFixed);
+    if (block != BlockMap::kNone) std::copy_n(map.columns.image(block), 6, out.begin());
+    return out;
+  };
+  CameraColumns out = *this;
+  out.parameters_.clear();
+  for (Parameter p : parameters_) {
+    p.column = map.solved_column[static_cast<std::size_t>(p.column)];
+    out.add(p);
+  }
+  for (std::size_t i = 0; i < poses_.size(); ++i) out.poses_[i] = columns_of(map.image_block[i]);
+  for (const std::uint32_t block : map.sensor_block) out.sensors_.push_back(columns_of(block));
+  for (const std::uint32_t block : map.frame_block) out.frames_.push_back(columns_of(block));
+  for (const std::uint32_t i : map.moved_images) {
+    const Mounted of{i, rigs.image_frame[i], rigs.image_sensor[i]};
+    if (map.frame_block[of.frame] != BlockMap::kNone ||
+        map.sensor_block[of.sensor] != BlockMap::kNone)
+      out.mounted_.push_back(of);
+  }
+  return out;
+}
+
+double CameraColumns::step_poses(const PoseColumns& columns,
+                                 const std::vector<RigidMotion<double>>& from,
+                                 const Buffer<double>& x,
+                                 std::vector<RigidMotion<double>>& to) const {
   double largest = 0;
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    const std::array<std::int32_t, 6>& c = poses_[i];
-    const RigidMotion<double>& pose = from.poses[i];
-    to.poses[i] = pose;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::array<std::int32_t, 6>& c = columns[i];
+    const RigidMotion<double>& pose = from[i];
+    to[i] = pose;
     if (c[0] < 0) continue;
     std::array<double, 6> d;
     for (std::size_t k = 0; k < 6; ++k) d[k] = x[static_cast<std::size_t>(c[k])];
-    to.poses[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
+    to[i] = left_perturbed(pose, {d[0], d[1], d[2]}, {d[3], d[4], d[5]});
     const auto& t = pose.translation;
     largest = std::max({largest, norm(d[3], d[4], d[5]),
                         norm(d[0], d[1], d[2]) / (norm(t[0], t[1], t[2]) + 1e-300)});
   }
+  return largest;
+}
+
+double CameraColumns::step(const CameraState& from, const Buffer<double>& x,
+                           CameraState& to) const {
+  double largest = step_poses(poses_, from.poses, x, to.poses);
+  largest = std::max(largest, step_poses(sensors_, from.sensors, x, to.sensors));
+  largest = std::max(largest, step_poses(frames_, from.frames, x, to.frames));
+  for (const Mounted& of : mounted_)
+    to.poses[of.image] = composed(to.sensors[of.sensor], to.frames[of.frame]);
   to.sets = from.sets;
   for (const Parameter& p : parameters_) {
     const double change = x[static_cast<std::size_t>(p.column)];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "geometry/rigid_motion.h"
+#include "lists/block_map.h"
 #include "lists/columns.h"
 #include "lists/lens_tracks.h"
 #include "platform/buffer.h"
@@ -20,6 +21,8 @@ struct CameraState {
   using Parameters = std::array<double, kMaxCameraParameters>;
   std::vector<RigidMotion<double>> poses;
   std::vector<Parameters> sets;
+  /// sensor_from_rig and rig_from_world: where an image has both, they give its pose.
+  std::vector<RigidMotion<double>> sensors{}, frames{};
 };
 
 /// The poses and lenses of a problem.
@@ -54,6 +57,8 @@ class CameraColumns {
                               const std::vector<std::uint32_t>& image_camera);
   /// Lenses of any model.
   static CameraColumns of_lenses(const Columns& columns, const LensTracks& tracks);
+  /// The same, where solved blocks are frames and sensors; `rigs` says which images are of which.
+  CameraColumns through(const BlockMap& map, const Rigs& rigs) const;
   /// Brightness a and b of each image: columns 6 and 7 of its block. b counts in grey levels of
   /// 255.
   static CameraColumns of_brightness(const Columns& columns);
@@ -68,7 +73,17 @@ class CameraColumns {
   CameraColumns(const Columns& columns, std::size_t images);
   void add(Parameter parameter);
 
-  std::vector<std::array<std::int32_t, 6>> poses_;  ///< of each image; all are fixed, or none
+  using PoseColumns = std::vector<std::array<std::int32_t, 6>>;  ///< all six are fixed, or none
+  struct Mounted {
+    std::uint32_t image, frame, sensor;
+  };
+
+  double step_poses(const PoseColumns& columns, const std::vector<RigidMotion<double>>& from,
+                    const Buffer<double>& x, std::vector<RigidMotion<double>>& to) const;
+
+  PoseColumns poses_;             ///< of each image
+  PoseColumns sensors_, frames_;  ///< of rigs
+  std::vector<Mounted> mounted_;  ///< images whose frame or sensor steps
   std::vector<Parameter> parameters_;
 };
 

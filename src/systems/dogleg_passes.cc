@@ -2,20 +2,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "systems/dogleg_passes.h"
 
-#include <array>
 #include <utility>
 
 namespace sheaf {
 
 DoglegPasses::DoglegPasses(std::unique_ptr<DoglegSource> source, const Columns& columns,
-                           const Chunks& chunks, bool points_held, Threads& threads)
+                           const Chunks& chunks, std::size_t blocks, bool points_held,
+                           Threads& threads)
     : source_(std::move(source)),
       columns_(columns),
       chunks_(chunks),
       points_held_(points_held),
       threads_(threads),
-      sums_(chunks, columns.num_images(), 0, threads),
-      direction_((static_cast<std::size_t>(columns.count) + 7) / 8 * 8) {}
+      sums_(chunks, blocks, 0, threads),
+      direction_((static_cast<std::size_t>(columns.count) + 7) / 8 * 8),
+      solved_(kBlockVector * columns.num_images()),
+      of_rows_(kBlockVector * blocks) {
+  solved_.fill(0);
+  of_rows_.fill(0);
+}
 
 void DoglegPasses::descend(const double* damping, double lambda) {
   sum_gradient();
@@ -29,27 +34,26 @@ void DoglegPasses::descend(const double* damping, double lambda) {
 }
 
 void DoglegPasses::write_steps(const Buffer<double>& columns) {
-  sums_.for_each_block([&](std::size_t i) {
-    double x[9];
-    for (int k = 0; k < 9; ++k) {
+  for (std::size_t i = 0; i < columns_.num_images(); ++i)
+    for (std::size_t k = 0; k < 9; ++k) {
       const std::int32_t c = columns_.image(i)[k];
-      x[k] = c >= 0 ? columns[c] : 0;
+      solved_[kBlockVector * i + k] = c >= 0 ? columns[static_cast<std::size_t>(c)] : 0;
     }
-    source_->write_step(i, x);
-  });
+  source_->write_steps(solved_.data(), columns_.num_images());
 }
 
 /// direction_ <- beta of the cameras. Images that share a lens add to its columns in their order.
 void DoglegPasses::sum_gradient() {
-  std::vector<std::array<double, 9>> of_image(columns_.num_images());
   sums_.run([&](const Chunk& chunk, double*, double* sums) { source_->gradient(chunk, sums); },
             [&](std::size_t i, const double* total) {
-              for (int k = 0; k < 9; ++k) of_image[i][k] = total[k];
+              std::copy_n(total, 9, &of_rows_[kBlockVector * i]);
             });
+  source_->gather(of_rows_.data(), sums_.num_blocks(), solved_.data());
   direction_.fill(0);
-  for (std::size_t i = 0; i < of_image.size(); ++i)
-    for (int k = 0; k < 9; ++k)
-      if (const std::int32_t c = columns_.image(i)[k]; c >= 0) direction_[c] += of_image[i][k];
+  for (std::size_t i = 0; i < columns_.num_images(); ++i)
+    for (std::size_t k = 0; k < 9; ++k)
+      if (const std::int32_t c = columns_.image(i)[k]; c >= 0)
+        direction_[static_cast<std::size_t>(c)] += solved_[kBlockVector * i + k];
 }
 
 void DoglegPasses::sum_curvature(double lambda) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -18,11 +19,15 @@ namespace sheaf {
 class DoglegSource {
  public:
   virtual ~DoglegSource() = default;
-  /// The step of a camera block, by its nine columns, for the passes that follow.
-  virtual void write_step(std::size_t block, const double* x) = 0;
+  /// The steps of the solved blocks, kBlockVector for each, for the passes that follow.
+  virtual void write_steps(const double* x, std::size_t blocks) = 0;
   /// Adds -J^T r of the cameras, kProductRecord for each block, as points' factors have eliminated
   /// nothing of it.
   virtual void gradient(const Chunk& chunk, double* sums) = 0;
+  /// What such sums come to by solved blocks, both kBlockVector for each.
+  virtual void gather(const double* sums, std::size_t blocks, double* solved) const {
+    std::copy_n(sums, kBlockVector * blocks, solved);
+  }
   /// Adds |J v|^2 and the points' part of |v|_C^2.
   virtual void curvature(const Chunk& chunk, double lambda, bool points_held,
                          CurvatureOutput& out) = 0;
@@ -36,8 +41,9 @@ class DoglegSource {
 /// is in their factors.
 class DoglegPasses {
  public:
+  /// blocks: of the rows.
   DoglegPasses(std::unique_ptr<DoglegSource> source, const Columns& columns, const Chunks& chunks,
-               bool points_held, Threads& threads);
+               std::size_t blocks, bool points_held, Threads& threads);
 
   // Both leave their direction as the step that the source knows.
 
@@ -49,7 +55,9 @@ class DoglegPasses {
   const Buffer<double>& direction() const { return direction_; }  ///< of the cameras, by column
   double gradient2() const { return gradient2_; }                 ///< beta^T C^-1 beta = |v|_C^2
   double curvature() const { return curvature_; }                 ///< |J v|^2
-  std::uint64_t bytes() const { return sums_.bytes() + direction_.bytes(); }
+  std::uint64_t bytes() const {
+    return sums_.bytes() + direction_.bytes() + solved_.bytes() + of_rows_.bytes();
+  }
 
  private:
   void write_steps(const Buffer<double>& columns);
@@ -63,6 +71,7 @@ class DoglegPasses {
   Threads& threads_;
   ProductSums sums_;
   Buffer<double> direction_;
+  Buffer<double> solved_, of_rows_;  ///< kBlockVector per block
   double gradient2_ = 0, curvature_ = 0;
 };
 

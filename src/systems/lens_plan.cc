@@ -56,10 +56,11 @@ LensCounts count_lenses(const Arrangement& arranged) {
 WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clusters& clusters,
                               Threads& threads) {
   const LensTracks& tracks = arranged.tracks;
-  WorkCounts c = count_work(arranged.batches, image_columns(tracks, arranged.columns, true),
+  const BlockMap* map = arranged.map ? &*arranged.map : nullptr;
+  WorkCounts c = count_work(arranged.batches, image_columns(tracks, arranged.columns, true), map,
                             points_held, clusters, threads);
   c.lenses = count_lenses(arranged);
-  c.images_couple = !points_held || tracks.most_blocks > 0;
+  c.images_couple = c.images_couple || tracks.most_blocks > 0;
   const auto images = static_cast<double>(c.columns);
   const LensColumns more(tracks);
   // A border of columns is rows more of every panel; own columns widen the images' blocks.
@@ -69,7 +70,7 @@ WorkCounts estimate_lens_work(const Arrangement& arranged, bool points_held, Clu
                    more.border * more.border * images;
   c.sparse_doubles = static_cast<std::uint64_t>(
       static_cast<double>(c.sparse_doubles) * wider * wider + more.border * images);
-  c.columns = static_cast<std::uint64_t>(arranged.columns.count);
+  c.columns = static_cast<std::uint64_t>(arranged.solved_columns().count);
   // Images that share a point couple all blocks of the one with all of the other; and each image is
   // coupled with its lens.
   const std::uint64_t coupled = blocks_of_an_image(tracks) * blocks_of_an_image(tracks);
@@ -93,7 +94,8 @@ WorkCounts count_lens_work(const Arrangement& arranged, const LensChunks& lists,
   c.lenses->listed = true;
   c.lenses->scratch_doubles =
       LensScratch(arranged.batches, arranged.tracks, chunks, lists.tiles).doubles;
-  if (c.images_couple) count_factor(arranged.columns, chunks.tiles, c);
+  if (c.images_couple)
+    count_factor(arranged.columns, arranged.map ? &*arranged.map : nullptr, chunks.tiles, c);
   return c;
 }
 

@@ -108,8 +108,8 @@ class LensRows::Dogleg : public DoglegSource {
  public:
   explicit Dogleg(const LensRows& rows) : rows_(rows), x_(kBlockVector * rows.num_blocks()) {}
 
-  void write_step(std::size_t block, const double* x) override {
-    std::copy_n(x, kCameraColumns, &x_[kBlockVector * block]);
+  void write_steps(const double* x, std::size_t blocks) override {
+    std::copy_n(x, kBlockVector * blocks, x_.data());
   }
   void gradient(const Chunk& chunk, double* sums) override {
     rows_.lens_kernels_.gradient(input(), chunk, sums);
@@ -260,11 +260,11 @@ double LensRows::residual_scale(double quantile) const {
       [&](const Chunk& chunk, double* out) { lens_kernels_.residuals(held_input(), chunk, out); });
 }
 
-std::unique_ptr<CameraSolver> LensRows::make_implicit(const Columns& columns, bool mixed) {
+PointRows::Operators LensRows::make_operators(const Columns& columns, bool mixed) {
   auto exact = std::make_unique<Operator>(*this, columns);
   std::unique_ptr<StateOperator> rounded;
   if (mixed) rounded = std::make_unique<RoundedOperator>(*this, columns, exact->sums());
-  return make_implicit_solver(columns, std::move(exact), std::move(rounded), threads_);
+  return {std::move(exact), std::move(rounded)};
 }
 
 std::unique_ptr<DoglegSource> LensRows::make_dogleg() { return std::make_unique<Dogleg>(*this); }

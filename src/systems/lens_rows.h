@@ -34,7 +34,7 @@ class LensRows : public PointRows {
                     Trial& out) override;
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
-  std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
+  Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override;
   std::uint64_t bytes() const override;
 

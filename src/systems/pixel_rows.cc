@@ -481,8 +481,8 @@ class PixelRows::Operator : public StateOperator {
   std::vector<PatchBlocks::Maps> maps_;
 };
 
-std::unique_ptr<CameraSolver> PixelRows::make_implicit(const Columns& columns, bool) {
-  return make_implicit_solver(columns, std::make_unique<Operator>(*this), nullptr, threads_);
+PointRows::Operators PixelRows::make_operators(const Columns&, bool) {
+  return {std::make_unique<Operator>(*this), nullptr};
 }
 
 std::uint64_t PixelRows::bytes() const {

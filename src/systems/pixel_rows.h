@@ -67,7 +67,7 @@ class PixelRows : public PointRows {
                     Trial& out) override;
   void accepted() override;
   double residual_scale(double quantile) const override;
-  std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) override;
+  Operators make_operators(const Columns& columns, bool mixed) override;
   std::uint64_t bytes() const override;
 
  private:

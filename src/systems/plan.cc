@@ -139,12 +139,15 @@ const char* to_string(SolverKind kind) {
   return "dense";
 }
 
-void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& c) {
+void count_factor(const Columns& columns, const BlockMap* map, const std::vector<Tile>& tiles,
+                  WorkCounts& c) {
+  if (map != nullptr) c.columns = static_cast<std::uint64_t>(map->columns.count);
   const auto n = static_cast<double>(c.columns);
   c.sparse_flops = n * n * n / 3;
   c.sparse_doubles = c.columns * (c.columns + 8);
   if (tiles.size() == c.tiles) {
-    c.analysis = analyse_columns(columns, tiles);
+    c.analysis = map == nullptr ? analyse_columns(columns, tiles)
+                                : analyse_columns(map->columns, map->solved_tiles(tiles));
     const SymbolicFactor& symbolic = c.analysis->symbolic;
     c.sparse_flops = symbolic.flops;
     c.sparse_doubles = symbolic.panel_doubles;
@@ -153,8 +156,8 @@ void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCo
   c.lens_shared = columns.lens_shared;
 }
 
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
-                      Clusters& clusters, Threads& threads) {
+WorkCounts count_work(const Batches& batches, const Columns& columns, const BlockMap* map,
+                      bool points_held, Clusters& clusters, Threads& threads) {
   WorkCounts c;
   c.images = columns.num_images();
   c.columns = static_cast<std::uint64_t>(columns.count);
@@ -163,16 +166,22 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, bool point
   c.observations = batches.observations;
   c.longest_track = batches.longest_track;
   c.images_couple = !points_held || columns.lens_shared;
-  if (points_held) return c;
+  if (points_held) {
+    if (map != nullptr) {
+      c.images_couple = c.images_couple || !map->solved_tiles({}).empty();
+      count_factor(columns, map, {}, c);
+    }
+    return c;
+  }
   for (const Batches::Group& group : batches.groups)
     c.pairs += std::uint64_t(group.track) * (group.track - 1) / 2 * group.lanes;
   const std::uint64_t all = c.images * (c.images + 1) / 2;
   std::vector<Tile> tiles;
   c.tiles = c.images <= WorkCounts::kExactImages ? count_tiles(batches, c.images, tiles, threads)
                                                  : std::min(all, c.pairs);
-  count_factor(columns, tiles, c);
+  count_factor(columns, map, tiles, c);
   c.pair_runs = estimate_pair_runs(batches, c);
-  clusters = coarse_clusters(batches, columns, threads);
+  if (map == nullptr) clusters = coarse_clusters(batches, columns, threads);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
   c.cluster_pairs = count_cluster_pairs(clusters.pairs);
   return c;

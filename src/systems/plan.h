@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lists/batches.h"
+#include "lists/block_map.h"
 #include "lists/chunks.h"
 #include "lists/columns.h"
 #include "platform/parallel.h"
@@ -58,12 +59,15 @@ struct WorkCounts {
   static constexpr std::uint64_t kExactImages = 20000;
   static constexpr std::uint64_t kAnalysedTiles = 4000000;
 };
-/// Also finds the clusters of the coarse space.
-WorkCounts count_work(const Batches& batches, const Columns& columns, bool points_held,
-                      Clusters& clusters, Threads& threads);
+/// Also finds the clusters of the coarse space. map: from the columns' blocks to what is solved
+/// for; null where these are the same.
+WorkCounts count_work(const Batches& batches, const Columns& columns, const BlockMap* map,
+                      bool points_held, Clusters& clusters, Threads& threads);
 
-/// Sets what depends on the factor of the formed matrix.
-void count_factor(const Columns& columns, const std::vector<Tile>& tiles, WorkCounts& counts);
+/// Sets what depends on the factor of the formed matrix. tiles: of the columns' blocks, all of them
+/// or, where they are too many to list, none.
+void count_factor(const Columns& columns, const BlockMap* map, const std::vector<Tile>& tiles,
+                  WorkCounts& counts);
 
 /// A solver and, in one line, why it was taken.
 struct Plan {

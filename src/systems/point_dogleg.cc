@@ -38,7 +38,7 @@ Trial PointSystem::trial() {
 DoglegPasses& PointSystem::passes() {
   if (passes_ == nullptr)
     passes_ = std::make_unique<DoglegPasses>(rows_->make_dogleg(), columns_, rows_->chunks(),
-                                             rules_.held, threads_);
+                                             rows_->num_blocks(), rules_.held, threads_);
   return *passes_;
 }
 

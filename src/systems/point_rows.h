@@ -14,6 +14,7 @@
 #include "reduced/camera_solver.h"
 #include "systems/camera_state.h"
 #include "systems/costs.h"
+#include "systems/implicit_solver.h"
 #include "systems/system.h"
 
 namespace sheaf {
@@ -119,8 +120,12 @@ class PointRows {
   /// Observations behind their camera at the held state, or as many as there may be.
   virtual std::uint64_t count_behind() const { return batches().observations; }
 
-  /// Conjugate gradients with the products computed again from the held state; null: not to be had.
-  virtual std::unique_ptr<CameraSolver> make_implicit(const Columns& columns, bool mixed) = 0;
+  /// Products computed again from the held state, for conjugate gradients; rounded: in single
+  /// precision, where it is mixed and to be had. columns: of the rows' own blocks.
+  struct Operators {
+    std::unique_ptr<StateOperator> exact, rounded;
+  };
+  virtual Operators make_operators(const Columns& columns, bool mixed) = 0;
   /// What a dogleg asks of the rows; null: not to be had.
   virtual std::unique_ptr<DoglegSource> make_dogleg();
 

@@ -59,8 +59,11 @@ void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const K
     case SolverKind::explicit_cg:
       return stage_.set_solver(
           make_explicit_solver(columns_, chunks, plan.mixed, kernels, threads_));
-    case SolverKind::implicit_cg:
-      return stage_.set_solver(rows_->make_implicit(columns_, plan.mixed));
+    case SolverKind::implicit_cg: {
+      PointRows::Operators products = rows_->make_operators(columns_, plan.mixed);
+      return stage_.set_solver(make_implicit_solver(columns_, std::move(products.exact),
+                                                    std::move(products.rounded), threads_));
+    }
   }
 }
 
