@@ -220,6 +220,14 @@ BlockMap map_rigs(const Problem& problem, const Fixed& fixed, const Columns& col
   return map;
 }
 
+std::vector<std::uint32_t> BlockMap::coarse_block() const {
+  std::vector<std::uint32_t> out = image_block;
+  for (const std::uint32_t i : moved_images)
+    for (const BlockPart* part = begin(i); part != end(i); ++part)
+      if (coarse_columns.image(part->block)[0] >= 0) out[i] = part->block;
+  return out;
+}
+
 std::vector<Tile> BlockMap::solved_tiles(const std::vector<Tile>& of_rows) const {
   std::vector<std::uint64_t> keys;
   const auto couple = [&](const BlockPart& a, const BlockPart& b) {

@@ -39,6 +39,9 @@ struct BlockMap {
   /// Solved columns by columns of rows, where these are the same; else kFixed.
   std::vector<std::int32_t> solved_column;
 
+  /// Of each image of the rows, the solved block that it moves with as the coarse space sees it.
+  std::vector<std::uint32_t> coarse_block() const;
+
   std::size_t row_blocks() const { return first_part.size() - 1; }
   const BlockPart* begin(std::size_t block) const { return &parts[0] + first_part[block]; }
   const BlockPart* end(std::size_t block) const { return &parts[0] + first_part[block + 1]; }

@@ -21,6 +21,7 @@ struct ReducedSums {
   const Chunks* chunks;
   const double* tiles;     ///< kTileDoubles per tile
   const double* diagonal;  ///< kDiagonalDoubles per image
+  const double* of_rows = nullptr;  ///< of the rows' own blocks, where these are others
 };
 
 /// Right-hand side b and diag(J^T J) of the free columns.

@@ -13,6 +13,18 @@ namespace sheaf {
 
 Covisibility::Covisibility(const Batches& batches, std::size_t images, Threads& threads)
     : first_(images + 1, 0) {
+  count(batches, images, [](std::uint32_t i) { return i; }, threads);
+}
+
+Covisibility::Covisibility(const Batches& batches, const std::vector<std::uint32_t>& number,
+                           std::size_t count_of_numbers, Threads& threads)
+    : first_(count_of_numbers + 1, 0) {
+  count(batches, count_of_numbers, [&](std::uint32_t i) { return number[i]; }, threads);
+}
+
+template <class Number>
+void Covisibility::count(const Batches& batches, std::size_t images, const Number& number,
+                         Threads& threads) {
   std::uint64_t pairs = 0;
   for (const Batches::Group& group : batches.groups)
     for (std::uint32_t step = 1; step < group.track; step *= 2)
@@ -26,7 +38,9 @@ Covisibility::Covisibility(const Batches& batches, std::size_t images, Threads& 
         const std::uint32_t* image = &batches.image[8 * group.first_batch + l];
         for (std::uint32_t step = 1; step < group.track; step *= 2)
           for (std::uint32_t o = step; o < group.track; ++o)
-            if (image[8 * o] != image[8 * (o - step)]) pair(image[8 * o], image[8 * (o - step)]);
+            if (const std::uint32_t a = number(image[8 * o]), b = number(image[8 * (o - step)]);
+                a != b && a < images && b < images)
+              pair(a, b);
       }
     }
   };
@@ -166,7 +180,7 @@ void list_clusters(const Batches& batches, const Batches::Group& group, std::uin
   touched.clear();
   const std::uint32_t* image = &batches.image[8 * group.first_batch + lane];
   for (std::uint32_t o = 0; o < group.track; ++o) {
-    const std::int32_t c = clusters.of_image[image[8 * o]];
+    const std::int32_t c = clusters.of_rows()[image[8 * o]];
     if (c == Clusters::kNone || (!touched.empty() && touched.back() == c)) continue;
     if (std::find(touched.begin(), touched.end(), c) == touched.end()) touched.push_back(c);
   }

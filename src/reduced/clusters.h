@@ -19,12 +19,17 @@ class Covisibility {
     std::uint32_t image, weight;
   };
   Covisibility(const Batches& batches, std::size_t images, Threads& threads);
+  /// Of what the images hang on: number[i] of each image i, at most `count`.
+  Covisibility(const Batches& batches, const std::vector<std::uint32_t>& number, std::size_t count,
+               Threads& threads);
 
   const Neighbour* begin(std::size_t image) const { return &neighbours_[first_[image]]; }
   const Neighbour* end(std::size_t image) const { return &neighbours_[first_[image + 1]]; }
 
  private:
   static constexpr std::uint64_t kPairsPerImage = 512, kMostPairs = 4000000;
+  template <class Number>
+  void count(const Batches& batches, std::size_t images, const Number& number, Threads& threads);
   void merge(std::vector<std::uint32_t>& others, Threads& threads);
 
   std::vector<std::uint64_t> first_;
@@ -37,6 +42,12 @@ struct Clusters {
   std::vector<std::int32_t> of_image;  ///< kNone where the pose is held
   std::int32_t count = 0;
   std::vector<std::int32_t> pairs{};  ///< number_cluster_pairs, where they have been numbered
+  /// Of each image of the rows, where these hang on other blocks; empty: as of_image.
+  std::vector<std::int32_t> of_row_image{};
+
+  const std::vector<std::int32_t>& of_rows() const {
+    return of_row_image.empty() ? of_image : of_row_image;
+  }
 };
 
 /// Numbers the pairs of clusters (row >= column, by triangle) that see a point in common, and all

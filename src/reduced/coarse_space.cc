@@ -29,17 +29,25 @@ constexpr double kRegularisation = 1e-10;
 
 }  // namespace
 
-Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads& threads) {
+Clusters coarse_clusters(const Batches& batches, const Columns& of_rows, const BlockMap* map,
+                         Threads& threads) {
+  const Columns& columns = map != nullptr ? map->coarse_columns : of_rows;
+  const std::vector<std::uint32_t> block =
+      map != nullptr ? map->coarse_block() : std::vector<std::uint32_t>();
   constexpr std::size_t kSample = 16;
   const std::size_t images = columns.num_images();
   if (images < kFewestImages) return {};
   const std::uint64_t most_pairs =
       std::max(kMostPairs, batches.observations / kObservationsPerPair);
-  const Covisibility graph(batches, images, threads);
+  const Covisibility graph = map != nullptr ? Covisibility(batches, block, images, threads)
+                                            : Covisibility(batches, images, threads);
   for (std::size_t each = std::max(kImagesEach, images / kMostClusters); each <= images;
        each += each / 2) {
     Clusters clusters = cluster_images(graph, columns, each);
     if (clusters.count > kMostClusters) continue;
+    for (const std::uint32_t b : block)
+      clusters.of_row_image.push_back(b == BlockMap::kNone ? Clusters::kNone
+                                                           : clusters.of_image[b]);
     // A sample of the points shows most of those that have too many pairs.
     if (count_cluster_pairs(number_cluster_pairs(batches, clusters, threads, kSample)) > most_pairs)
       continue;
@@ -49,10 +57,11 @@ Clusters coarse_clusters(const Batches& batches, const Columns& columns, Threads
   return {};  // hundreds of parts that share nothing
 }
 
-CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Clusters clusters,
-                         std::size_t slices, const Kernels& kernels, Threads& threads)
+CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, const BlockMap* map,
+                         Clusters clusters, std::size_t slices, const Kernels& kernels, Threads& threads)
     : batches_(batches),
       columns_(columns),
+      map_(map),
       kernels_(kernels),
       threads_(threads),
       clusters_(std::move(clusters)),
@@ -74,10 +83,11 @@ CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, Cluster
   for (std::size_t i = 0; i < columns.num_images(); ++i)
     zooms_[i] = columns.image(i)[6] >= 0 && uses[columns.image(i)[6]] == 1;
   sums_.allocate(slices * kCoarseTile * tiles_);
+  if (map != nullptr) row_basis_.allocate(kCoarseBasis * map->row_blocks());
 }
 
-void CoarseSpace::begin(const double* cameras, double lambda) {
-  if (schedule_.next(lambda) == CoarseSchedule::Matrix::summed) place(cameras);
+void CoarseSpace::begin(const State& state, double lambda) {
+  if (schedule_.next(lambda) == CoarseSchedule::Matrix::summed) place(state);
 }
 
 void CoarseSpace::clear(std::size_t slice) {
@@ -89,12 +99,13 @@ void CoarseSpace::add(std::size_t slice, const Chunk& chunk, const Records& reco
   if (schedule_.matrix() != CoarseSchedule::Matrix::summed) return;
   Buffer<double>& scratch = scratch_[threads_.worker()];
   if (scratch.size() == 0) scratch.allocate(coarse_scratch_doubles(batches_, clusters_.count));
-  const CoarseInput in{basis_.data(), clusters_.of_image.data(), tile_.data(), clusters_.count};
+  const CoarseInput in{row_basis(), clusters_.of_rows().data(), tile_.data(), clusters_.count};
   kernels_.coarse(batches_, chunk, records, in, scratch.data(),
                   &sums_[slice * kCoarseTile * tiles_]);
 }
 
-void CoarseSpace::place(const double* cameras) {
+void CoarseSpace::place(const State& state) {
+  const double* cameras = state.cameras;
   std::vector<std::uint32_t> members(clusters_.count, 0);
   std::fill(centres_.begin(), centres_.end(), std::array<double, 3>{});
   for (std::size_t i = 0; i < columns_.num_images(); ++i) {
@@ -108,6 +119,26 @@ void CoarseSpace::place(const double* cameras) {
     for (double& x : centres_[c]) x /= members[c];
   for (std::size_t i = 0; i < columns_.num_images(); ++i)
     place_image(i, cameras + kCameraRecord * i);
+  if (map_ != nullptr) place_rows(state.adjoints);
+}
+
+/// M Z, image by image of the rows.
+void CoarseSpace::place_rows(const double* adjoints) {
+  row_basis_.fill(0);
+  for (std::size_t i = 0; i < clusters_.of_row_image.size(); ++i) {
+    if (clusters_.of_row_image[i] == Clusters::kNone) continue;
+    double* to = &row_basis_[kCoarseBasis * i];
+    for (const BlockPart* part = map_->begin(i); part != map_->end(i); ++part) {
+      const double* Z = basis(part->block);
+      const bool identity = part->sensor == BlockPart::kIdentity;
+      const int rows = std::min(kRows, part->first + part->count);
+      for (int r = part->first; r < rows; ++r)
+        for (int k = identity ? r : 0; k < (identity ? r + 1 : 6); ++k) {
+          const double m = identity ? 1 : adjoints[36 * part->sensor + 6 * r + k];
+          for (int c = 0; c < 8; ++c) to[8 * r + c] += m * Z[8 * k + c];
+        }
+    }
+  }
 }
 
 /// How an image moves so that its pixels stay when the points move about the cluster's centre m:
@@ -158,10 +189,10 @@ void CoarseSpace::add_tiles() {
 /// Z_i^T S_ii Z_i, cluster by cluster.
 void CoarseSpace::sum_own(const double* diagonal) {
   own_.fill(0);
-  for (std::size_t i = 0; i < columns_.num_images(); ++i) {
-    const std::int32_t c = clusters_.of_image[i];
+  for (std::size_t i = 0; i < clusters_.of_rows().size(); ++i) {
+    const std::int32_t c = clusters_.of_rows()[i];
     if (c == Clusters::kNone) continue;
-    const double* Z = basis(i);
+    const double* Z = row_basis() + kCoarseBasis * i;
     double SZ[kRows][8] = {};
     for (int r = 0; r < kRows; ++r)
       for (int k = 0; k < kRows; ++k) {
@@ -247,6 +278,7 @@ CoarseSpace::History CoarseSpace::history() const {
   const auto summed = static_cast<std::ptrdiff_t>(kCoarseTile * tiles_);
   return {schedule_,
           {basis_.begin(), basis_.end()},
+          {row_basis_.begin(), row_basis_.end()},
           {sums_.begin(), sums_.begin() + summed},
           {own_.begin(), own_.end()}};
 }
@@ -254,6 +286,7 @@ CoarseSpace::History CoarseSpace::history() const {
 void CoarseSpace::restore(const History& history) {
   schedule_ = history.schedule;
   std::copy(history.basis.begin(), history.basis.end(), basis_.begin());
+  std::copy(history.row_basis.begin(), history.row_basis.end(), row_basis_.begin());
   std::copy(history.sums.begin(), history.sums.end(), sums_.begin());
   std::copy(history.own.begin(), history.own.end(), own_.begin());
 }

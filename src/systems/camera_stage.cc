@@ -45,7 +45,8 @@ bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request, Ste
   residual_ = nullptr;
   cut_ = false;
   if (columns_.count == 0) return true;
-  corrected_ = coarse_ && coarse_->factor(sums.diagonal, damping_.data());
+  corrected_ = coarse_ && coarse_->factor(sums.of_rows != nullptr ? sums.of_rows : sums.diagonal,
+                                          damping_.data());
   const CameraSolution solution = solver_->solve(system(sums, request), step_);
   ++solves_;
   step.linear_iterations = solution.iterations;

@@ -97,7 +97,26 @@ ReducedSums MappedRows::finish(double* tiles, double* diagonal) {
   const ReducedSums of_rows = rows_->finish(tiles, diagonal);
   row_diagonal_ = of_rows.diagonal;
   fold_.fold(adjoints_, of_rows.tiles, of_rows.diagonal);
-  return {&solved_chunks_, fold_.tile_sums(), fold_.diagonal()};
+  return {&solved_chunks_, fold_.tile_sums(), fold_.diagonal(), of_rows.diagonal};
+}
+
+CoarseSpace::State MappedRows::coarse_state() {
+  if (records_.size() == 0) records_.allocate(kCameraRecord * map_.columns.num_images());
+  records_.fill(0);
+  const CameraState& held = state_->held.cameras;
+  const auto write = [&](std::uint32_t block, const RigidMotion<double>& pose) {
+    if (block == BlockMap::kNone) return;
+    double* record = &records_[kCameraRecord * block];
+    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+    std::copy(R.begin(), R.end(), record);
+    std::copy(pose.translation.begin(), pose.translation.end(),
+              record + pose_record::kTranslation);
+  };
+  for (std::size_t f = 0; f < map_.frame_block.size(); ++f)
+    write(map_.frame_block[f], held.frames[f]);
+  for (std::size_t i = 0; i < map_.image_block.size(); ++i)
+    write(map_.image_block[i], held.poses[i]);
+  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().data()};
 }
 
 void MappedRows::step(const Buffer<double>& columns) {

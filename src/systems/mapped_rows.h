@@ -27,6 +27,8 @@ class MappedRows : public PointRows {
   bool keeps_metric() const override { return rows_->keeps_metric(); }
   void attach(const SteppedState& state) override;
   const double* held_cameras() const override { return rows_->held_cameras(); }
+  CoarseSpace::State coarse_state() override;
+  const BlockMap* map() const override { return &map_; }
   void begin(const StepRequest& request) override { rows_->begin(request); }
   Records eliminate(const Elimination& in, std::uint32_t chunk, double* scratch, double* tiles,
                     double* diagonal, EliminateOutput& out) override {
@@ -63,6 +65,7 @@ class MappedRows : public PointRows {
   Adjoints adjoints_;  ///< of the held state
   const double* row_diagonal_ = nullptr;
   Buffer<double> solved_, of_rows_, row_columns_;
+  Buffer<double> records_;  ///< kCameraRecord per solved block: poses of images and frames
 };
 
 }  // namespace sheaf

@@ -38,7 +38,7 @@ PhotometricSystem::Parts PhotometricSystem::make(const PatchScene& scene, const 
   const bool iterates =
       plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
   if (iterates && rows->blocks_are_images() && !rules.points_held)
-    plan.clusters = coarse_clusters(rows->batches(), rows->pose_columns(), threads);
+    plan.clusters = coarse_clusters(rows->batches(), rows->pose_columns(), nullptr, threads);
   Start start{std::move(cameras), CameraColumns::of_brightness(columns), &state.points};
   PixelRows* const pixels = rows.get();
   return {std::move(rows), pixels, std::move(start), {rules.points_held}, std::move(plan)};

@@ -181,7 +181,7 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, const Bloc
                                                  : std::min(all, c.pairs);
   count_factor(columns, map, tiles, c);
   c.pair_runs = estimate_pair_runs(batches, c);
-  if (map == nullptr) clusters = coarse_clusters(batches, columns, threads);
+  clusters = coarse_clusters(batches, columns, map, threads);
   c.clusters = static_cast<std::uint64_t>(clusters.count);
   c.cluster_pairs = count_cluster_pairs(clusters.pairs);
   return c;

@@ -12,6 +12,7 @@
 #include "platform/buffer.h"
 #include "platform/parallel.h"
 #include "reduced/camera_solver.h"
+#include "reduced/coarse_space.h"
 #include "systems/camera_state.h"
 #include "systems/costs.h"
 #include "systems/implicit_solver.h"
@@ -89,6 +90,10 @@ class PointRows {
   /// Records of the held cameras, kCameraRecord per image, of which the first are R, t and, where
   /// an image has a focal length of its own, f.
   virtual const double* held_cameras() const = 0;
+  /// What the coarse space is placed by, and the map of the rows' blocks to the solved ones, where
+  /// these differ.
+  virtual CoarseSpace::State coarse_state() { return {held_cameras()}; }
+  virtual const BlockMap* map() const { return nullptr; }
 
   /// Before an elimination of the held state.
   virtual void begin(const StepRequest&) {}

@@ -46,7 +46,7 @@ void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const K
       plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
   if (iterates && !rules_.held && plan.clusters.count > 0)
     stage_.set_coarse(std::make_unique<CoarseSpace>(
-        rows_->batches(), *columns.coarse, plan.clusters, num_slices(), kernels, threads_));
+        rows_->batches(), *columns.coarse, rows_->map(), plan.clusters, num_slices(), kernels, threads_));
   const Chunks& chunks = rows_->reduced_chunks();
   switch (plan.kind) {
     case SolverKind::blocks:
@@ -142,7 +142,7 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
   const Elimination in{request.damping, rules_.held, loss_, chart_,
                        state_.own_damping.size() > 0 ? state_.own_damping.data() : nullptr};
   CoarseSpace* const coarse = stage_.coarse();
-  if (coarse != nullptr) coarse->begin(rows_->held_cameras(), request.damping);
+  if (coarse != nullptr) coarse->begin(rows_->coarse_state(), request.damping);
   threads_.for_each(outputs.size(), [&](std::size_t s) {
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(rows_->scratch());

@@ -49,7 +49,7 @@ struct Linearised {
     fill_state();
     const Covisibility graph(batches, kImages, threads);
     Clusters clusters = cluster_images(graph, columns, each);
-    coarse = std::make_unique<CoarseSpace>(batches, columns, std::move(clusters),
+    coarse = std::make_unique<CoarseSpace>(batches, columns, nullptr, std::move(clusters),
                                            chunks.slices.size() - 1, kernels, threads);
     linearize(lambda, kernels);
     factored = coarse->factor(diagonal.data(), damping.data());
@@ -84,7 +84,7 @@ struct Linearised {
     const EliminateInput in{&batches, &chunks, cameras.data(), points.data(), lambda, false};
     EliminateOutput out{factors.data(), 0, 0, 0};
     const Records records = records_in(scratch.data(), chunks);
-    coarse->begin(cameras.data(), lambda);
+    coarse->begin({cameras.data()}, lambda);
     for (std::size_t s = 0; s + 1 < chunks.slices.size(); ++s) {
       coarse->clear(s);
       for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
@@ -210,7 +210,7 @@ TEST(CoarseSpace, AMatrixThatIsKeptTakesTheNewDamping) {
   for (double& d : l.damping) d *= 0.5;
   Buffer<double> elsewhere(l.cameras.size());
   elsewhere.fill(1);
-  l.coarse->begin(elsewhere.data(), 5e-4);
+  l.coarse->begin({elsewhere.data()}, 5e-4);
   l.coarse->clear(0);
   ASSERT_TRUE(l.coarse->factor(nullptr, l.damping.data()));
   expect_same_correction(l, kernels.name);
@@ -241,7 +241,7 @@ TEST(CoarseSpace, SimilaritiesOfTheWholeSceneCostNothing) {
 
 TEST(CoarseSpace, SmallProblemsHaveNone) {
   const Linearised l({}, 1, 1e-3, 6, reference_kernels());
-  EXPECT_EQ(coarse_clusters(l.batches, l.columns, l.threads).count, 0);
+  EXPECT_EQ(coarse_clusters(l.batches, l.columns, nullptr, l.threads).count, 0);
 }
 
 }  // namespace
