@@ -83,6 +83,9 @@ HWY_INLINE void curvature_part(const CurvatureInput& in, std::size_t g, int part
     V square = zero();
     for (int i = 0; i < 3; ++i) square = fma(gradient[i], step[i], square);
     sums.gradient2[part] = fma(mask, square, sums.gradient2[part]);
+    if (batches.prior.size() > 0)
+      sums.square[part] =
+          hn::Add(sums.square[part], prior_curvature(batches, {group, g, part}, step));
   }
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     V c[kCameraRecord], e0, e1;

@@ -46,6 +46,40 @@ struct GroupPart {
   }
 };
 
+/// 1 / sigma of a batch's lanes, for batches that have sigmas.
+HWY_INLINE V inverse_sigma_of(const Batches& batches, const GroupPart& of, std::uint64_t b) {
+  return load(&batches.inverse_sigma[8 * b + of.lane()]);
+}
+
+/// The points' own rows (lists/batches.h), for batches that have some: U and what it makes of Y -
+/// mean.
+struct PriorRows {
+  V u[6], r[3];
+
+  HWY_INLINE PriorRows(const Batches& batches, const GroupPart& of, const V* Y) {
+    const double* at = &batches.prior[kPointPrior * of.group + of.lane()];
+    V e[3];
+    for (int i = 0; i < 6; ++i) u[i] = load(at + point_prior::root(i));
+    for (int i = 0; i < 3; ++i) e[i] = hn::Sub(Y[i], load(at + point_prior::mean(i)));
+    times(e, r);
+  }
+  /// U e.
+  HWY_INLINE void times(const V* e, V* out) const {
+    out[0] = fma(u[0], e[0], fma(u[1], e[1], hn::Mul(u[2], e[2])));
+    out[1] = fma(u[3], e[1], hn::Mul(u[4], e[2]));
+    out[2] = hn::Mul(u[5], e[2]);
+  }
+  HWY_INLINE V square() const { return fma(r[0], r[0], fma(r[1], r[1], hn::Mul(r[2], r[2]))); }
+};
+
+/// |U v|^2 of the points' own rows.
+HWY_INLINE V prior_curvature(const Batches& batches, const GroupPart& of, const V* v) {
+  const PriorRows rows(batches, of, v);
+  V e[3];
+  rows.times(v, e);
+  return fma(e[0], e[0], fma(e[1], e[1], hn::Mul(e[2], e[2])));
+}
+
 /// The points and the first `rows` rows of the factors of groups [first, end): asked for early,
 /// because they come from far away and nothing of a group can begin without them.
 HWY_INLINE void prefetch_groups(const double* points, const double* factors, int rows,

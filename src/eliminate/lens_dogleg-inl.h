@@ -71,6 +71,9 @@ HWY_INLINE void lens_curvature_part(const LensProductInput& in, double damping, 
     descend_point(in.factors + kFactorGroup * g + lane, set(damping), gradient, step);
     for (int i = 0; i < 3; ++i) sum = fma(gradient[i], step[i], sum);
     gradient2 = fma(mask, sum, gradient2);
+    const Batches& batches = *in.of.batches;
+    if (batches.prior.size() > 0)
+      square = hn::Add(square, prior_curvature(batches, {group, g, part}, step));
   }
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     V unused[3] = {zero(), zero(), zero()}, e[2];

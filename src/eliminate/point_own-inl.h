@@ -47,19 +47,32 @@ HWY_INLINE TrackCost robust_pass(const TrialOf<typename Source::State>& in, cons
                                  const V* Y, [[maybe_unused]] const LaneChart* chart,
                                  RobustSums& sums) {
   const LossLanes loss(in.how.loss);
+  const Batches& batches = *in.tried.batches;
+  const bool sigmas = batches.inverse_sigma.size() > 0;
   V square = zero(), cost = zero();
   if (kLinearize) sums.clear();
   for (std::uint64_t b = of.first_batch; b < of.first_batch + of.track; ++b) {
     LaneJacobian j = Source::template evaluate<kLinearize>(in.tried, of, b, Y);
-    const V square_here = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
+    V weight, r[2] = {j.r[0], j.r[1]};
+    if (sigmas) {
+      weight = inverse_sigma_of(batches, of, b);
+      for (V& x : r) x = hn::Mul(x, weight);
+    }
+    const V square_here = fma(r[0], r[0], hn::Mul(r[1], r[1]));
     square = hn::Add(square, square_here);
     const Rho rho = rho_lanes(loss, square_here);
     cost = hn::Add(cost, rho.value);
     if constexpr (kLinearize) {
       if (chart != nullptr)
         for (V* row : {j.point[0], j.point[1]}) chart->transpose(row);
-      sums.add(j, metric_of(rho, j.r, square_here));
+      const Metric metric = metric_of(rho, r, square_here);
+      sums.add(j, sigmas ? weighed(metric, weight) : metric);
     }
+  }
+  if (batches.prior.size() > 0) {
+    const PriorRows own(batches, of, Y);
+    if constexpr (kLinearize) add_prior(own, chart, sums.weight);
+    cost = hn::Add(cost, own.square());
   }
   return {square, cost};
 }

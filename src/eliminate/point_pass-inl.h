@@ -90,6 +90,24 @@ HWY_INLINE void apply_loss(const LossRows& rows, LaneJacobian& j) {
   rows.residual(j.r);
 }
 
+/// Adds the points' own rows to their sums; chart: as for other rows.
+HWY_INLINE void add_prior(const PriorRows& rows, const LaneChart* chart, PointSums& p) {
+  LaneJacobian j;
+  const V none = zero();
+  const V of_rows[4][3] = {{rows.u[0], rows.u[1], rows.u[2]},
+                           {none, rows.u[3], rows.u[4]},
+                           {none, none, rows.u[5]},
+                           {none, none, none}};
+  for (int k = 0; k < 4; k += 2) {
+    for (int r = 0; r < 2; ++r) {
+      j.r[r] = k + r < 3 ? rows.r[k + r] : none;
+      for (int i = 0; i < 3; ++i) j.point[r][i] = of_rows[k + r][i];
+      if (chart != nullptr) chart->transpose(j.point[r]);
+    }
+    p.add(j);
+  }
+}
+
 /// The base of a part's points at a state.
 template <class Source>
 HWY_INLINE void base_of(const ChartRules& rules, const typename Source::State& at,
@@ -146,14 +164,26 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   V square = sums.square[of.part], robust = sums.loss[of.part];
   const double* rows = nullptr;
   double* const room = Source::room(to);
+  [[maybe_unused]] const bool sigmas = in.of.batches->inverse_sigma.size() > 0;
   for (std::uint32_t o = 0; o < of.track; ++o) {
     const std::uint64_t b = of.first_batch + o;
     LaneJacobian j = source.rows(b, scale, room + source.stride() * o);
+    [[maybe_unused]] V weight;
+    if constexpr (kRobust && Source::kEvaluates)
+      if (sigmas) {
+        weight = inverse_sigma_of(*in.of.batches, of, b);
+        for (V& r : j.r) r = hn::Mul(r, weight);
+      }
     if constexpr (Source::kEvaluates) square = Source::add_square(j, square);
     if constexpr (kRobust) {
       const V s = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
-      const LossRows rows(LossLanes(in.how.loss), j.r, s);
-      const Metric metric = metric_of(rows.rho, j.r, s);
+      LossRows rows(LossLanes(in.how.loss), j.r, s);
+      Metric metric = metric_of(rows.rho, j.r, s);
+      if constexpr (Source::kEvaluates)
+        if (sigmas) {
+          rows.weigh_columns(weight);
+          metric = weighed(metric, weight);
+        }
       less.add(j, metric, kCharted ? &chart : nullptr);
       apply_loss(rows, j);
       if constexpr (Source::kMostBlocks > 0)
@@ -167,6 +197,12 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
     rows = source.keep(j, o, room);
   }
   sums.square[of.part] = square;
+  if constexpr (kRobust && Source::kEvaluates)
+    if (in.of.batches->prior.size() > 0) {
+      const PriorRows own(*in.of.batches, of, X);
+      add_prior(own, kCharted ? &chart : nullptr, p);
+      cost = hn::Add(cost, own.square());
+    }
   if constexpr (kRobust) {
     store(cost, out.point_costs + 8 * of.group + of.lane());
     robust = hn::Add(robust, cost);
@@ -204,7 +240,7 @@ inline void eliminate_chunk(const EliminationOf<typename Source::State>& in, con
 template <class Source>
 inline void eliminate_points(const EliminationOf<typename Source::State>& in, const Chunk& chunk,
                              const typename Source::KeptRecords& records, EliminateOutput& out) {
-  const bool robust = in.how.loss.kind != LossKind::none;
+  const bool robust = in.how.loss.weighs();
   if (in.how.chart.base == ChartBase::none)
     (robust ? eliminate_chunk<Source, true, false>
             : eliminate_chunk<Source, false, false>)(in, chunk, records, out);

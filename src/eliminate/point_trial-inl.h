@@ -158,14 +158,14 @@ inline void trial_chunk(const TrialOf<typename Source::State>& in, const Chunk& 
 template <class Source>
 inline void try_points(const TrialOf<typename Source::State>& in, const Chunk& chunk,
                        TrialOutput& out) {
-  const bool robust = in.how.loss.kind != LossKind::none;
+  const bool robust = in.how.loss.weighs();
   if (in.how.chart.base == ChartBase::none)
     (robust ? trial_chunk<Source, true, false> : trial_chunk<Source, false, false>)(in, chunk, out);
   else
     (robust ? trial_chunk<Source, true, true> : trial_chunk<Source, false, true>)(in, chunk, out);
 }
 
-/// |r_x| and |r_y| of every lane, masked ones included.
+/// |r_x| and |r_y| of every lane in sigmas, masked ones included.
 template <class Source>
 inline void residuals_of(const typename Source::State& at, const Chunk& chunk, double* out) {
   for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
@@ -174,7 +174,9 @@ inline void residuals_of(const typename Source::State& at, const Chunk& chunk, d
       V X[3];
       of.load_points(Source::points(at), X);
       for (std::uint64_t b = of.first_batch; b < of.first_batch + of.track; ++b) {
-        const LaneJacobian j = Source::template evaluate<false>(at, of, b, X);
+        LaneJacobian j = Source::template evaluate<false>(at, of, b, X);
+        if (at.batches->inverse_sigma.size() > 0)
+          for (V& r : j.r) r = hn::Mul(r, inverse_sigma_of(*at.batches, of, b));
         double* to = out + 16 * (b - chunk.first_batch) + of.lane();
         store(hn::Abs(j.r[0]), to), store(hn::Abs(j.r[1]), to + 8);
       }

@@ -55,11 +55,12 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
-    out.square_sum += row.square();
-    if (in.loss.kind != LossKind::none) {
-      const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
+    const double by = inverse_sigma_at(*in.batches, b, lane);
+    out.square_sum += by * by * row.square();
+    if (in.loss.weighs()) {
+      const RowMetric metric = weighed_metric(in.loss, row.r, by);
       add_less(metric, row.j.point.data(), less);
-      cost += apply_loss(in.loss, row).value;
+      cost += apply_loss(in.loss, row, by).value;
       store_metric(metric, out.metric, b, lane);
     }
     for (int e = 0; e < 2; ++e)
@@ -68,6 +69,7 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
         for (int k = 0; k < 3; ++k) A[3 * i + k] += row.j.point[3 * e + i] * row.j.point[3 * e + k];
       }
   }
+  cost += add_prior(*in.batches, g, lane, X, A, gradient);
   out.loss_sum += cost;
   const PointCoordinates at(in.chart, base_of(in.chart, *in.batches, group, lane, in.cameras), X);
   const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
@@ -79,14 +81,14 @@ void eliminate_point(const EliminateInput& in, const Chunk& chunk, std::size_t g
   const Vector3<double> w = f.forward(gradient.data());
   const double w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
   out.point_decrease += w2;
-  out.gradient_max2 = std::max(out.gradient_max2, in.loss.kind == LossKind::none ? w2 : by_weight);
-  if (in.loss.kind != LossKind::none) out.point_costs[8 * g + lane] = cost;
+  out.gradient_max2 = std::max(out.gradient_max2, in.loss.weighs() ? by_weight : w2);
+  if (in.loss.weighs()) out.point_costs[8 * g + lane] = cost;
   store_factor(f, w, D, out.factors + kFactorGroup * g + lane);
   for (std::uint32_t o = 0; o < group.track; ++o) {
     const std::uint64_t b = group.first_batch + o;
     const std::uint64_t record = 8 * (b - chunk.first_batch) + lane;
     Row row = row_of(*in.batches, in.cameras, X, b, lane);
-    if (in.loss.kind != LossKind::none) apply_loss(in.loss, row);
+    if (in.loss.weighs()) apply_loss(in.loss, row, inverse_sigma_at(*in.batches, b, lane));
     write_record(row, f, w, T + kTRecord * record, C + kCRecord * record);
   }
 }

@@ -61,6 +61,7 @@ void curvature(const CurvatureInput& in, const Chunk& chunk, CurvatureOutput& ou
     for (std::uint32_t l = 0; l < batches.groups[g].lanes; ++l) {
       const PointDescent point(in, g, l);
       for (int i = 0; i < 3; ++i) out.gradient2 += point.gradient[i] * point.step[i];
+      out.square_sum += prior_curvature(batches, g, l, point.step);
     }
   for_each_observation(batches, chunk, [&](std::size_t g, std::uint64_t b, std::uint32_t l) {
     const WeightedRow row(in.state, g, b, l);

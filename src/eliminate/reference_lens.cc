@@ -31,16 +31,20 @@ PointTrack look_at_point(const LensEliminateInput& in, std::size_t g, std::uint3
   PointTrack track{g, lane, {}};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     LensRow row = lens_row(in.of, X, b, lane);
-    out.square_sum += row.square();
-    if (in.loss.kind != LossKind::none) {
-      const RowMetric metric = metric_of(in.loss, evaluate_loss(in.loss, row.square()), row.r);
+    const double by = inverse_sigma_at(*in.of.batches, b, lane);
+    out.square_sum += by * by * row.square();
+    if (in.loss.weighs()) {
+      const RowMetric metric = weighed_metric(in.loss, row.r, by);
       add_less(metric, row.point[0].data(), track.less);
-      track.cost += apply_loss(in.loss, row).value;
+      track.cost += apply_loss(in.loss, row, by).value;
       store_metric(metric, out.metric, b, lane);
     }
     track.rows.push_back(row);
   }
-  if (in.loss.kind != LossKind::none) out.point_costs[8 * g + lane] = track.cost;
+  Matrix3<double> unused{};
+  Vector3<double> unused_too{};
+  track.cost += add_prior(*in.of.batches, g, lane, X, unused, unused_too);
+  if (in.loss.weighs()) out.point_costs[8 * g + lane] = track.cost;
   out.loss_sum += track.cost;
   return track;
 }
@@ -159,15 +163,15 @@ void eliminate_point(const LensEliminateInput& in, const Chunk& chunk, std::size
   const PointTrack track = look_at_point(in, g, lane, out);
   PointNormal normal;
   for (const LensRow& row : track.rows) normal.add(row);
+  add_prior(*in.of.batches, g, lane, point_of(in.of.at.points, g, lane), normal.V, normal.g);
   const Batches& batches = *in.of.batches;
   const Vector3<double> base = base_of(in.chart, batches, batches.groups[g], lane, in.of.at.images);
   const PointCoordinates at(in.chart, base, point_of(in.of.at.points, g, lane));
   const double lambda = damping_of_point(in.damping, in.own_damping, g, lane);
   const EliminatedPoint p(normal, at, lambda, in.points_held);
   out.point_decrease += p.decrease();
-  const double gradient2 = in.loss.kind == LossKind::none
-                               ? p.decrease()
-                               : gradient_by_weight(at, normal.V, track.less, normal.g);
+  const double gradient2 =
+      in.loss.weighs() ? gradient_by_weight(at, normal.V, track.less, normal.g) : p.decrease();
   out.gradient_max2 = std::max(out.gradient_max2, gradient2);
   p.store(out.factors + kFactorGroup * g + lane);
   std::vector<WhitenedRow> whitened;

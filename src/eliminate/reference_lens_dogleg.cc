@@ -60,11 +60,15 @@ void lens_curvature_by_reference(const LensProductInput& in, double damping, boo
       for (std::size_t r = 0; r < 2; ++r)
         for (std::size_t i = 0; i < 3; ++i) gradient[i] -= m.w * row.point[r][i] * row.r[r];
     });
+    Matrix3<double> unused{};
+    const Vector3<double> X = point_of(in.of.at.points, g, l);
+    add_prior(*in.of.batches, g, l, X, unused, gradient);
     const double* factor = in.factors + kFactorGroup * g + l;
     for (std::size_t i = 0; i < 3 && !points_held; ++i) {
       step[i] = damping * gradient[i] / factor[factor_group::damping(static_cast<int>(i))];
       out.gradient2 += gradient[i] * step[i];
     }
+    out.square_sum += prior_curvature(*in.of.batches, g, l, step);
     for_each_row(in, g, l, [&](const LensRow& row, const BlocksOfRow& of, const RowMetric& m) {
       std::array<double, 2> e = motion_of(in, row, of);
       for (std::size_t r = 0; r < 2; ++r)

@@ -200,6 +200,42 @@ inline void store_metric(const RowMetric& m, double* metric, std::uint64_t batch
   for (std::size_t e = 0; e < 2; ++e) at[metric_batch::kAlong + 8 * e] = m.u[e];
 }
 
+inline double inverse_sigma_at(const Batches& batches, std::uint64_t batch, std::uint32_t lane) {
+  return batches.inverse_sigma.size() == 0 ? 1 : batches.inverse_sigma[8 * batch + lane];
+}
+
+/// A point's own rows at X: V += U^T U, g -= U^T r with r = U (X - mean). Returns |r|^2.
+inline double add_prior(const Batches& batches, std::size_t g, std::uint32_t lane,
+                        const Vector3<double>& X, Matrix3<double>& V, Vector3<double>& gradient) {
+  if (batches.prior.size() == 0) return 0;
+  const double* at = &batches.prior[kPointPrior * g + lane];
+  const auto u = [at](int i) { return at[point_prior::root(i)]; };
+  const Matrix3<double> U{u(0), u(1), u(2), 0, u(3), u(4), 0, 0, u(5)};
+  double square = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    double r = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      r += U[3 * k + i] * (X[i] - at[point_prior::mean(static_cast<int>(i))]);
+    square += r * r;
+    for (std::size_t i = 0; i < 3; ++i) {
+      gradient[i] -= U[3 * k + i] * r;
+      for (std::size_t c = 0; c < 3; ++c) V[3 * i + c] += U[3 * k + i] * U[3 * k + c];
+    }
+  }
+  return square;
+}
+/// |U v|^2.
+inline double prior_curvature(const Batches& batches, std::size_t g, std::uint32_t lane,
+                              const Vector3<double>& v) {
+  Matrix3<double> V{};
+  Vector3<double> unused{};
+  add_prior(batches, g, lane, v, V, unused);
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k) sum += v[i] * V[3 * i + k] * v[k];
+  return sum;
+}
+
 /// less += (Jp^T u) (Jp^T u)^T: what a loss's metric takes from V by its weight alone. point: Jp,
 /// row by row.
 inline void add_less(const RowMetric& metric, const double* point, Matrix3<double>& less) {

@@ -41,16 +41,19 @@ PointCost cost_at(const Of& of, const Batches::Group& group, const Vector3<doubl
   PointCost out;
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     auto row = of.tried().row(b, lane, X);
-    const LossValue<double> rho = evaluate_loss(of.in.loss, row.square());
-    const RowMetric metric = metric_of(of.in.loss, rho, row.r);
-    out.square += row.square();
+    const double by = inverse_sigma_at(*of.in.batches, b, lane), square = by * by * row.square();
+    const LossValue<double> rho = evaluate_loss(of.in.loss, square);
+    const RowMetric metric = weighed_metric(of.in.loss, row.r, by);
+    out.square += square;
     out.cost += rho.value;
     add_less(metric, row.point[0].data(), out.less);
-    const double root = std::sqrt(rho.first);
+    const double root = by * std::sqrt(rho.first);
     for (double& r : row.r) r *= root;
     row.visit_columns([root](double& j0, double& j1) { j0 *= root, j1 *= root; });
     out.normal.add(row);
   }
+  const auto g = static_cast<std::size_t>(&group - of.in.batches->groups.data());
+  out.cost += add_prior(*of.in.batches, g, lane, X, out.normal.V, out.normal.g);
   return out;
 }
 
@@ -135,7 +138,7 @@ template <class Of>
 Vector3<double> step_of_point(const Of& of, std::size_t g, std::uint32_t lane,
                               const Vector3<double>& X) {
   const Batches::Group& group = of.in.batches->groups[g];
-  const double* metric = of.in.loss.kind == LossKind::none ? nullptr : of.in.metric;
+  const double* metric = of.in.loss.weighs() ? of.in.metric : nullptr;
   Vector3<double> s{};
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
     const auto row = of.held().row(b, lane, X);
@@ -162,7 +165,7 @@ void try_point(const Of& of, std::size_t g, std::uint32_t lane, TrialOutput& out
   Vector3<double> Y = at.step(blended(of.in.blend, factor, d), moved);
   const Vector3<double> stay =
       at.step({moved[0] - at.base[0], moved[1] - at.base[1], moved[2] - at.base[2]}, moved);
-  const bool settles = of.in.loss.kind != LossKind::none && of.in.inner_iterations > 0;
+  const bool settles = of.in.loss.weighs() && of.in.inner_iterations > 0;
   const PointCost cost = settles
                              ? settle_point(of, group, lane, factor, moved, at.plain() ? X : stay,
                                             of.in.own.held_costs[8 * g + lane],
@@ -179,7 +182,7 @@ void try_point(const Of& of, std::size_t g, std::uint32_t lane, TrialOutput& out
   const double size2 = at.plain() ? d2 / x2 : chart_step2(of.in.chart, at.chart, there.chart);
   out.step2_max = std::max(out.step2_max, size2);
   out.square_sum += cost.square;
-  if (of.in.loss.kind != LossKind::none) out.loss_sum += cost.cost;
+  if (of.in.loss.weighs()) out.loss_sum += cost.cost;
   out.newly_behind += of.count_crossed(group, lane, X, Y);
 }
 

@@ -15,7 +15,11 @@ struct ScaledLoss {
   /// Of the curvature along a residual, as a part of its weight: what steps see of it is not below
   /// (geometry/row_metric.h). 1: the weight alone. Costs do not depend on it.
   double floor = 1;
+  /// Rows count by sigmas, or points have rows of their own: passes weigh them though there may be
+  /// no loss.
+  bool weighted = false;
 
+  bool weighs() const { return kind != LossKind::none || weighted; }
   friend bool operator==(const ScaledLoss&, const ScaledLoss&) = default;
 };
 

@@ -49,10 +49,20 @@ inline RowMetric metric_of(const ScaledLoss& loss, const LossValue<double>& rho,
   return {rho.first, {by * r[0], by * r[1]}};
 }
 
+/// Of rows by pixels, 1 / inverse_sigma of which count as one: their residual is r.
+inline RowMetric weighed_metric(const ScaledLoss& loss, const std::array<double, 2>& r,
+                                double inverse_sigma) {
+  const std::array<double, 2> x{inverse_sigma * r[0], inverse_sigma * r[1]};
+  const RowMetric m = metric_of(loss, evaluate_loss(loss, x[0] * x[0] + x[1] * x[1]), x);
+  return {inverse_sigma * inverse_sigma * m.w, {inverse_sigma * m.u[0], inverse_sigma * m.u[1]}};
+}
+
 /// The loss's rows of an observation of any kind: with member r and visit_columns(f), which calls
-/// f(j0, j1) for the two entries of each column. Returns rho of what the residual was.
+/// f(j0, j1) for the two entries of each column. Returns rho of what the residual was, in
+/// sigmas.
 template <class Row>
-LossValue<double> apply_loss(const ScaledLoss& loss, Row& row) {
+LossValue<double> apply_loss(const ScaledLoss& loss, Row& row, double inverse_sigma = 1) {
+  for (double& x : row.r) x *= inverse_sigma;
   const double s = row.square();
   const LossValue<double> rho = evaluate_loss(loss, s);
   const double phi = curvature_along(loss, rho, s), root = std::sqrt(rho.first);
@@ -60,8 +70,8 @@ LossValue<double> apply_loss(const ScaledLoss& loss, Row& row) {
   const std::array<double, 2> r = row.r;
   row.visit_columns([&](double& j0, double& j1) {
     const double along = shorter * (r[0] * j0 + r[1] * j1);
-    j0 = root * (j0 - r[0] * along);
-    j1 = root * (j1 - r[1] * along);
+    j0 = inverse_sigma * root * (j0 - r[0] * along);
+    j1 = inverse_sigma * root * (j1 - r[1] * along);
   });
   for (double& x : row.r) x *= root / std::sqrt(phi);
   return rho;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "platform/parallel.h"
+#include "scene/terms.h"
 
 namespace sheaf {
 namespace {
@@ -260,6 +261,26 @@ void form_groups(const Buffer<KeyedPoint>& order, const ByPoint& by_point, Batch
   out.xy.allocate(16 * batches);
 }
 
+/// The points' own rows. They are few, so that most groups have none.
+void fill_priors(const Problem& p, Batches& out) {
+  if (p.terms.points.empty()) return;
+  std::vector<const PointPrior*> of_point(p.num_points(), nullptr);
+  for (const PointPrior& prior : p.terms.points) of_point[prior.point] = &prior;
+  out.prior.allocate(kPointPrior * out.groups.size());
+  out.prior.fill(0);
+  for (std::size_t g = 0; g < out.groups.size(); ++g)
+    for (std::uint32_t l = 0; l < out.groups[g].lanes; ++l) {
+      const PointPrior* prior = of_point[out.lane_point[8 * g + l]];
+      if (prior == nullptr) continue;
+      double* to = &out.prior[kPointPrior * g + l];
+      const std::array<double, 9> U = *whitening(prior->covariance);
+      const std::array<double, 6> upper{U[0], U[1], U[2], U[4], U[5], U[8]};
+      for (int i = 0; i < 6; ++i) to[point_prior::root(i)] = upper[static_cast<std::size_t>(i)];
+      for (int i = 0; i < 3; ++i)
+        to[point_prior::mean(i)] = prior->position[static_cast<std::size_t>(i)];
+    }
+}
+
 void fill_group(const Problem& p, const ByPoint& by_point, std::size_t g, Batches& out) {
   const Batches::Group& group = out.groups[g];
   for (int l = 0; l < 8; ++l) {
@@ -269,6 +290,7 @@ void fill_group(const Problem& p, const ByPoint& by_point, std::size_t g, Batche
       out.image[8 * b + l] = p.observation_image[i];
       out.xy[16 * b + l] = p.observation_xy[2 * i];
       out.xy[16 * b + 8 + l] = p.observation_xy[2 * i + 1];
+      if (!p.observation_sigma.empty()) out.inverse_sigma[8 * b + l] = 1 / p.observation_sigma[i];
     }
   }
   for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
@@ -285,9 +307,11 @@ Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip, T
   Batches out;
   out.observations = by_point.first[problem.num_points()];
   form_groups(order_points(problem, by_point, threads), by_point, out, threads);
+  if (!problem.observation_sigma.empty()) out.inverse_sigma.allocate(8 * out.num_batches());
   threads.for_ranges(out.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
     for (; g < end; ++g) fill_group(problem, by_point, g, out);
   });
+  fill_priors(problem, out);
   return out;
 }
 

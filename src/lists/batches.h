@@ -12,6 +12,15 @@ namespace sheaf {
 
 class Threads;
 
+/// A point's own rows, U (X - mean), 8 lanes each: U by rows of its upper triangle, then the mean.
+/// U is 0 of points that have none, and in masked lanes.
+constexpr std::size_t kPointPrior = 72;
+namespace point_prior {
+constexpr int kRoot = 0, kMean = 48;
+constexpr int root(int i) { return kRoot + 8 * i; }  ///< u00, u01, u02, u11, u12, u22
+constexpr int mean(int i) { return kMean + 8 * i; }
+}  // namespace point_prior
+
 /// Observations arranged for eight lanes. Points are sorted by track length and then by the images
 /// that see them; a group is eight points of one track length; a batch is one observation of each
 /// of its eight points. So sums over a point's track need no scatter, and most batches see one
@@ -27,10 +36,14 @@ struct Batches {
   Buffer<std::uint32_t> image;            ///< 8 per batch: image index
   Buffer<std::int32_t> uniform;           ///< per batch: the image all lanes share, or -1
   Buffer<double> xy;                      ///< 16 per batch: x of the lanes, then y, pixels
+  Buffer<double> inverse_sigma;           ///< 8 per batch, 1 / pixels; empty: 1
+  Buffer<double> prior;  ///< kPointPrior per group; empty: no point has rows of its own
   std::uint32_t longest_track = 0;
   std::uint64_t observations = 0;
 
   std::uint64_t num_batches() const { return uniform.size(); }
+  /// Whether passes weigh the rows, be there a loss or none.
+  bool weighted() const { return inverse_sigma.size() > 0 || prior.size() > 0; }
 };
 
 /// Arranges the observations of a valid problem; those with skip[i] != 0 are left out (skip may be

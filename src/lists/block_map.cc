@@ -115,7 +115,8 @@ class MapBuilder {
     }
     map_.first_part.push_back(static_cast<std::uint32_t>(map_.parts.size()));
     map_.coarse_columns = map_.columns;
-    for (std::size_t b = 0; b < map_.columns.num_images(); ++b)
+    map_.first_kept = static_cast<std::uint32_t>(map_.columns.num_images()) - map_.kept;
+    for (std::size_t b = 0; b < map_.first_kept; ++b)
       for (std::size_t k = b < coarse_blocks_ ? kPose : 0; k < 9; ++k)
         map_.coarse_columns.of_image[9 * b + k] = Columns::kFixed;
   }
@@ -210,9 +211,18 @@ Fixed fixed_images(const Problem& problem, const Fixed& fixed) {
   return out;
 }
 
-BlockMap map_rigs(const Problem& problem, const Fixed& fixed, const Columns& columns,
-                  bool restated) {
+Columns with_kept_points(const Columns& columns, std::uint32_t count, bool held) {
+  Columns out = columns;
+  for (std::uint32_t j = 0; j < count; ++j)
+    for (int k = 0; k < 9; ++k)
+      out.of_image.push_back(k < 3 && !held ? out.count++ : Columns::kFixed);
+  return out;
+}
+
+BlockMap map_blocks(const Problem& problem, const Fixed& fixed, const Columns& columns,
+                    std::uint32_t kept, bool restated) {
   BlockMap map;
+  map.kept = kept;
   MapBuilder builder(problem, columns, restated, map);
   builder.number_poses(moving_poses(problem, fixed));
   builder.add_images();
@@ -237,9 +247,12 @@ std::vector<Tile> BlockMap::solved_tiles(const std::vector<Tile>& of_rows) const
   for (std::size_t i = 0; i < row_blocks(); ++i)
     for (const BlockPart* a = begin(i); a != end(i); ++a)
       for (const BlockPart* b = begin(i); b != a; ++b) couple(*a, *b);
-  for (const Tile& tile : of_rows)
+  const auto couple_tile = [&](const Tile& tile) {
     for (const BlockPart* a = begin(tile.row); a != end(tile.row); ++a)
       for (const BlockPart* b = begin(tile.column); b != end(tile.column); ++b) couple(*a, *b);
+  };
+  for (const Tile& tile : of_rows) couple_tile(tile);
+  for (const Tile& tile : term_tiles) couple_tile(tile);
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   std::vector<Tile> out;

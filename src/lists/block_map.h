@@ -35,6 +35,9 @@ struct BlockMap {
   std::vector<std::uint32_t> frame_block;   ///< of each frame
   std::vector<std::uint32_t> sensor_block;  ///< of each sensor
   std::vector<std::uint32_t> moved_images;  ///< those whose pose is of a frame and a sensor
+  /// Kept points: their solved blocks are the last ones, as their blocks of rows are.
+  std::uint32_t first_kept = kNone, kept = 0;
+  std::vector<Tile> term_tiles;  ///< of rows: what terms couple
 
   /// Solved columns by columns of rows, where these are the same; else kFixed.
   std::vector<std::int32_t> solved_column;
@@ -46,8 +49,8 @@ struct BlockMap {
   const BlockPart* begin(std::size_t block) const { return &parts[0] + first_part[block]; }
   const BlockPart* end(std::size_t block) const { return &parts[0] + first_part[block + 1]; }
 
-  /// The solved tiles, row > column, that the diagonal blocks of the rows and these tiles of them
-  /// add to.
+  /// The solved tiles, row > column, that the diagonal blocks of the rows, the terms' tiles and
+  /// these add to.
   std::vector<Tile> solved_tiles(const std::vector<Tile>& of_rows) const;
 };
 
@@ -62,10 +65,15 @@ MovingPoses moving_poses(const Problem& problem, const Fixed& fixed);
 /// `fixed` as rows by images see it: an image of a rig is held where its frame and its sensor are.
 Fixed fixed_images(const Problem& problem, const Fixed& fixed);
 
-/// `columns`: of the rows' blocks, first the images', as fixed_images() leaves them free. Each set
-/// of columns 6 to 8 that several images or images of rigs have is a solved block of its own.
-/// restated: cameras are turned, so that reference sensors are not the identity.
-BlockMap map_rigs(const Problem& problem, const Fixed& fixed, const Columns& columns,
-                  bool restated = false);
+/// `columns`: of the rows' blocks, first the images', as fixed_images() leaves them free, the last
+/// `kept` those of kept points. Each set of columns 6 to 8 that several images or images of rigs
+/// have is a solved block of its own. restated: cameras are turned, so that reference sensors are
+/// not the identity.
+BlockMap map_blocks(const Problem& problem, const Fixed& fixed, const Columns& columns,
+                    std::uint32_t kept, bool restated);
+
+/// The columns, and three for each of `count` blocks of kept points behind them; none where these
+/// are held.
+Columns with_kept_points(const Columns& columns, std::uint32_t count, bool held);
 
 }  // namespace sheaf

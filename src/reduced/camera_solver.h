@@ -16,12 +16,20 @@
 
 namespace sheaf {
 
+/// Tiles of rows that are in no record of elimination: of terms.
+struct Couplings {
+  const Tile* tiles = nullptr;
+  const double* sums = nullptr;  ///< kTileDoubles each
+  std::size_t count = 0;
+};
+
 /// The reduced camera system before damping, as the elimination leaves it.
 struct ReducedSums {
   const Chunks* chunks;
-  const double* tiles;     ///< kTileDoubles per tile
-  const double* diagonal;  ///< kDiagonalDoubles per image
+  const double* tiles;              ///< kTileDoubles per tile
+  const double* diagonal;           ///< kDiagonalDoubles per image
   const double* of_rows = nullptr;  ///< of the rows' own blocks, where these are others
+  Couplings couplings{};            ///< by the rows' own blocks; they are among the tiles, too
 };
 
 /// Right-hand side b and diag(J^T J) of the free columns.

@@ -13,13 +13,15 @@ namespace sheaf {
 
 Covisibility::Covisibility(const Batches& batches, std::size_t images, Threads& threads)
     : first_(images + 1, 0) {
-  count(batches, images, [](std::uint32_t i) { return i; }, threads);
+  count(
+      batches, images, [](std::uint32_t i) { return i; }, threads);
 }
 
 Covisibility::Covisibility(const Batches& batches, const std::vector<std::uint32_t>& number,
                            std::size_t count_of_numbers, Threads& threads)
     : first_(count_of_numbers + 1, 0) {
-  count(batches, count_of_numbers, [&](std::uint32_t i) { return number[i]; }, threads);
+  count(
+      batches, count_of_numbers, [&](std::uint32_t i) { return number[i]; }, threads);
 }
 
 template <class Number>

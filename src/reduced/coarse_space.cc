@@ -31,7 +31,8 @@ constexpr double kRegularisation = 1e-10;
 
 Clusters coarse_clusters(const Batches& batches, const Columns& of_rows, const BlockMap* map,
                          Threads& threads) {
-  const Columns& columns = map != nullptr ? map->coarse_columns : of_rows;
+  Columns columns = map != nullptr ? map->coarse_columns : of_rows;
+  if (map != nullptr) columns.of_image.resize(9 * std::size_t(map->first_kept));
   const std::vector<std::uint32_t> block =
       map != nullptr ? map->coarse_block() : std::vector<std::uint32_t>();
   constexpr std::size_t kSample = 16;
@@ -58,7 +59,8 @@ Clusters coarse_clusters(const Batches& batches, const Columns& of_rows, const B
 }
 
 CoarseSpace::CoarseSpace(const Batches& batches, const Columns& columns, const BlockMap* map,
-                         Clusters clusters, std::size_t slices, const Kernels& kernels, Threads& threads)
+                         Clusters clusters, std::size_t slices, const Kernels& kernels,
+                         Threads& threads)
     : batches_(batches),
       columns_(columns),
       map_(map),
@@ -110,16 +112,35 @@ void CoarseSpace::place(const State& state) {
   std::fill(centres_.begin(), centres_.end(), std::array<double, 3>{});
   for (std::size_t i = 0; i < columns_.num_images(); ++i) {
     const std::int32_t to = clusters_.of_image[i];
-    if (to == Clusters::kNone) continue;
+    if (to == Clusters::kNone || i >= state.first_point) continue;
     const double *c = cameras + kCameraRecord * i, *t = c + camera_record::kTranslation;
     ++members[to];
     for (int k = 0; k < 3; ++k) centres_[to][k] -= c[k] * t[0] + c[3 + k] * t[1] + c[6 + k] * t[2];
   }
   for (std::int32_t c = 0; c < clusters_.count; ++c)
     for (double& x : centres_[c]) x /= members[c];
-  for (std::size_t i = 0; i < columns_.num_images(); ++i)
-    place_image(i, cameras + kCameraRecord * i);
+  for (std::size_t i = 0; i < columns_.num_images(); ++i) {
+    const double* record = cameras + kCameraRecord * i;
+    i < state.first_point ? place_image(i, record) : place_point(i, record);
+  }
   if (map_ != nullptr) place_rows(state.adjoints);
+}
+
+/// X + e, X + e x (X - m), X + (X - m): as place_image has them.
+void CoarseSpace::place_point(std::size_t block, const double* X) {
+  double* Z = &basis_[kCoarseBasis * block];
+  std::fill_n(Z, kCoarseBasis, 0.0);
+  const std::int32_t cluster = clusters_.of_image[block];
+  if (cluster == Clusters::kNone) return;
+  double q[3];
+  for (int k = 0; k < 3; ++k) q[k] = X[k] - centres_[cluster][k];
+  for (int m = 0; m < 3; ++m) {
+    const int s = (m + 1) % 3, t = (m + 2) % 3;
+    Z[8 * m + m] = 1;
+    Z[8 * s + 3 + m] = -q[t];
+    Z[8 * t + 3 + m] = q[s];
+    Z[8 * m + 6] = q[m];
+  }
 }
 
 /// M Z, image by image of the rows.
@@ -235,7 +256,34 @@ void CoarseSpace::scale() {
   }
 }
 
-bool CoarseSpace::factor(const double* diagonal, const double* damping) {
+/// What terms couple blocks of two clusters by, or two of one: -(Z_r^T P Z_c + its transpose).
+void CoarseSpace::add_couplings(const Couplings& couplings) {
+  for (std::size_t t = 0; t < couplings.count; ++t) {
+    const Tile& tile = couplings.tiles[t];
+    const std::int32_t a = clusters_.of_rows()[tile.row], b = clusters_.of_rows()[tile.column];
+    if (a == Clusters::kNone || b == Clusters::kNone) continue;
+    const double* P = couplings.sums + kTileDoubles * t;
+    const double *Za = row_basis() + kCoarseBasis * tile.row,
+                 *Zb = row_basis() + kCoarseBasis * tile.column;
+    for (int i = 0; i < 8; ++i)
+      for (int k = 0; k < 8; ++k) {
+        double sum = 0;
+        for (int r = 0; r < kRows; ++r)
+          for (int c = 0; c < kRows; ++c)
+            sum += Za[8 * r + i] * tile_entry(P, r, c) * Zb[8 * c + k];
+        const std::int32_t row = 8 * a + i, column = 8 * b + k;
+        if (a == b) {
+          cholesky_.at(std::max(row, column), std::min(row, column)) -=
+              row == column ? 2 * sum : sum;
+        } else {
+          cholesky_.at(std::max(row, column), std::min(row, column)) -= sum;
+        }
+      }
+  }
+}
+
+bool CoarseSpace::factor(const double* diagonal, const double* damping,
+                         const Couplings& couplings) {
   if (schedule_.matrix() == CoarseSchedule::Matrix::unneeded) return false;
   if (schedule_.matrix() == CoarseSchedule::Matrix::summed) {
     add_slices(sums_, slices_, threads_);
@@ -243,6 +291,7 @@ bool CoarseSpace::factor(const double* diagonal, const double* damping) {
   }
   cholesky_.clear(threads_);
   add_tiles();
+  add_couplings(couplings);
   add_damping(damping);
   scale();
   return cholesky_.factor(threads_);

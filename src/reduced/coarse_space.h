@@ -17,14 +17,16 @@
 
 namespace sheaf {
 
+struct Couplings;
+
 /// Clusters of images that move as rigid bodies which may also grow and zoom: Z has kCoarseModes
 /// columns for each cluster, and E = Z^T (S + D) Z. Schur-Jacobi passes a correction on from image
 /// to image; a solve with E carries it through the scene at once (docs/math.md, section 7). Z and S
 /// in E may be those of an earlier state (CoarseSchedule), D is always the present one.
 class CoarseSpace {
  public:
-  /// columns: of the solved blocks. map: from the images of the rows to these; null where images are
-  /// what is solved for.
+  /// columns: of the solved blocks. map: from the images of the rows to these; null where images
+  /// are what is solved for.
   CoarseSpace(const Batches& batches, const Columns& columns, const BlockMap* map,
               Clusters clusters, std::size_t slices, const Kernels& kernels, Threads& threads);
 
@@ -33,6 +35,7 @@ class CoarseSpace {
   struct State {
     const double* cameras;
     const double* adjoints = nullptr;
+    std::size_t first_point = SIZE_MAX;  ///< from this block on records are of kept points: X, Y, Z
   };
   /// Before a state is linearised with this relative damping: whether E is needed, and if so summed
   /// anew with Z at this state.
@@ -43,7 +46,7 @@ class CoarseSpace {
   /// Forms E, from the new sums and S's diagonal blocks or from those kept, and factors it. False
   /// where it is not needed or not positive definite to rounding: no correction then. diagonal: of
   /// the rows' blocks.
-  bool factor(const double* diagonal, const double* damping);
+  bool factor(const double* diagonal, const double* damping, const Couplings& couplings);
   /// What a solve with the correction took, and the cost of a state that is gone on to.
   void solved(int iterations) { schedule_.solved(iterations); }
   void moved(double cost) { schedule_.moved(cost); }
@@ -67,11 +70,13 @@ class CoarseSpace {
 
  private:
   void place(const State& state);
+  void place_point(std::size_t block, const double* X);
   void place_rows(const double* adjoints);
   const double* row_basis() const { return map_ ? row_basis_.data() : basis_.data(); }
   void place_image(std::size_t image, const double* camera);
   void sum_own(const double* diagonal);
   void add_tiles();
+  void add_couplings(const Couplings& couplings);
   void add_damping(const double* damping);
   void scale();
 
@@ -87,7 +92,7 @@ class CoarseSpace {
   std::vector<std::array<double, 3>> centres_;  ///< of the clusters' cameras
   std::vector<double> scale_;                   ///< of each mode: E has a unit diagonal
   Buffer<double> basis_;
-  Buffer<double> row_basis_;  ///< of each image of the rows, M Z; where these are mapped
+  Buffer<double> row_basis_;        ///< of each image of the rows, M Z; where these are mapped
   std::vector<std::int32_t> tile_;  ///< number_cluster_pairs
   std::size_t tiles_;
   Buffer<double> sums_;  ///< kCoarseTile per tile, one set per slice, the first ends up as the sum

@@ -50,13 +50,19 @@ HWY_INLINE Metric metric_of(const Rho& rho, const V* r, V s) {
   return {rho.weight, hn::Mul(by, r[0]), hn::Mul(by, r[1])};
 }
 
+/// The same of rows by pixels.
+HWY_INLINE Metric weighed(const Metric& m, V inverse_sigma) {
+  return {hn::Mul(m.w, hn::Mul(inverse_sigma, inverse_sigma)), hn::Mul(m.u0, inverse_sigma),
+          hn::Mul(m.u1, inverse_sigma)};
+}
+
 /// N and what it makes of the residual: N e = root (e - shorter r (r . e)), and longer r.
 struct LossRows {
   V root, shorter, longer;
   V r[2];
   Rho rho;
 
-  /// Of the residual r, s = |r|^2.
+  /// Of the residual r in sigmas, s = |r|^2.
   HWY_INLINE LossRows(const LossLanes& loss, const V* residual, V s)
       : r{residual[0], residual[1]}, rho(rho_lanes(loss, s)) {
     root = hn::Sqrt(rho.weight);
@@ -69,6 +75,8 @@ struct LossRows {
     j0 = hn::Mul(root, fnma(r[0], along, j0));
     j1 = hn::Mul(root, fnma(r[1], along, j1));
   }
+  /// Columns come by pixels, so many of which count as one.
+  HWY_INLINE void weigh_columns(V inverse_sigma) { root = hn::Mul(root, inverse_sigma); }
   HWY_INLINE void residual(V* out) const {
     out[0] = hn::Mul(longer, r[0]), out[1] = hn::Mul(longer, r[1]);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "geometry/camera_model.h"
 
@@ -107,9 +108,11 @@ std::optional<std::string> wrong_terms(const Problem& problem) {
     if (of.image >= problem.num_images()) wrong = "it names an image that there is not";
     if (wrong) return at("centre prior", terms.centres, of, *wrong);
   }
+  std::set<std::uint32_t> named;
   for (const PointPrior& of : terms.points) {
     auto wrong = wrong_position(of.position, of.covariance, {});
     if (of.point >= problem.num_points()) wrong = "it names a point that there is not";
+    if (!wrong && !named.insert(of.point).second) wrong = "the point has another one: combine them";
     if (wrong) return at("point prior", terms.points, of, *wrong);
   }
   for (const DistancePrior& of : terms.distances) {

@@ -4,8 +4,6 @@
 
 #include <string>
 
-#include "scene/rigs.h"
-
 namespace sheaf {
 
 Result<Arrangement> arrange_with_lenses(const Problem& problem, const Fixed& fixed,
@@ -20,7 +18,6 @@ Result<Arrangement> arrange_with_lenses(const Problem& problem, const Fixed& fix
                                        " observations and lenses of one point can be solved for");
   out.columns = number_lens_columns(out.tracks, fixed_images(problem, fixed));
   out.coarse_columns = image_columns(out.tracks, out.columns, false);
-  if (has_rigid_frames(problem.rigs)) out.map = map_rigs(problem, fixed, out.columns);
   return out;
 }
 

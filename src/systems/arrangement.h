@@ -23,8 +23,8 @@ struct Arrangement {
   Columns columns;         ///< of the images' blocks, and of the lenses' own blocks behind them
   Columns coarse_columns;  ///< of lens rows the images' poses alone: what the coarse space moves
   LensChunks lists;        ///< of BAL rows the chunks alone
-  std::optional<BlockMap> map;  ///< of the images' blocks to what is solved for, where these differ
-
+  std::optional<BlockMap> map;  ///< of the rows' blocks to what is solved for, where these differ
+  Columns row_columns;          ///< with it: `columns`, and those of kept points
   /// Columns that are solved for, and those that the coarse space moves.
   const Columns& solved_columns() const { return map ? map->columns : columns; }
   const Columns& solved_coarse_columns() const {

@@ -79,6 +79,13 @@ CameraState BalView::cameras(const Problem& problem) const {
   return out;
 }
 
+std::array<double, 2> BalView::turned(const Problem& problem, std::size_t image,
+                                      const std::array<double, 2>& xy) const {
+  if (!turns(problem, image)) return xy;
+  const RadialView& view = views_[problem.image_camera[image]];
+  return {xy[0] - view.cx, view.cy - xy[1]};
+}
+
 void BalView::turn(const Problem& problem, Batches& batches, Threads& threads) const {
   if (!turns_) return;
   constexpr std::size_t kBatches = 8192;

@@ -33,6 +33,9 @@ class BalView {
   /// Measurements as they were arranged, from the problem's to the view's.
   void turn(const Problem& problem, Batches& batches, Threads& threads) const;
   void turn(const Problem& problem, ImageBatches& batches, Threads& threads) const;
+  /// One measurement likewise.
+  std::array<double, 2> turned(const Problem& problem, std::size_t image,
+                               const std::array<double, 2>& xy) const;
   /// What was refined, back into the problem's own models.
   void store(const CameraState& cameras, Problem& problem) const;
 

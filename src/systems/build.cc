@@ -2,17 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "systems/build.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
 #include "eliminate/kernel_table.h"
 #include "platform/memory.h"
 #include "scene/rigs.h"
+#include "scene/terms.h"
 #include "systems/bal_rows.h"
 #include "systems/image_system.h"
 #include "systems/lens_rows.h"
 #include "systems/mapped_rows.h"
 #include "systems/point_system.h"
+#include "systems/term_rows.h"
 
 namespace sheaf {
 namespace {
@@ -48,6 +51,41 @@ ChartBase chart_base(PointParametrisation points) {
   return ChartBase::none;
 }
 
+/// `skip`, and what the terms have of the kept points.
+std::vector<std::uint8_t> skipped(const Problem& problem, const std::vector<std::uint8_t>& skip,
+                                  const std::vector<std::uint32_t>& kept) {
+  if (kept.empty()) return skip;
+  std::vector<std::uint8_t> out = skip;
+  out.resize(problem.num_observations(), 0);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    if (std::binary_search(kept.begin(), kept.end(), problem.observation_point[i])) out[i] = 1;
+  return out;
+}
+
+/// Kept points go with the images that see them.
+void join_kept(const Problem& problem, const std::vector<std::uint32_t>& kept, const BlockMap& map,
+               Clusters& clusters) {
+  if (clusters.count == 0) return;
+  std::vector<std::int32_t> of_kept(kept.size(), Clusters::kNone);
+  for (std::size_t i = 0; i < problem.num_observations() && !kept.empty(); ++i) {
+    const auto at = std::lower_bound(kept.begin(), kept.end(), problem.observation_point[i]);
+    if (at == kept.end() || *at != problem.observation_point[i]) continue;
+    std::int32_t& cluster = of_kept[static_cast<std::size_t>(at - kept.begin())];
+    if (cluster == Clusters::kNone) cluster = clusters.of_row_image[problem.observation_image[i]];
+  }
+  clusters.of_image.resize(map.columns.num_images(), Clusters::kNone);
+  clusters.of_row_image.resize(map.row_blocks(), Clusters::kNone);
+  for (std::size_t j = 0; j < kept.size(); ++j) {
+    clusters.of_image[map.first_kept + j] = of_kept[j];
+    clusters.of_row_image[map.row_blocks() - kept.size() + j] = of_kept[j];
+  }
+}
+
+/// Whether terms are of states that BAL's view would restate.
+bool restates_terms(const Problem& problem) {
+  return !problem.terms.gaussians.empty() && !has_only_bal_cameras(problem);
+}
+
 /// A few hundred megabytes are worth a pass over the observations at the end.
 bool lends_observations(const Problem& problem, const Batches& batches, const SolveOptions& options,
                         Threads& threads) {
@@ -79,7 +117,9 @@ Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
   Build build(options, kernels, threads);
   build.points_ = choose_points(problem, skip, options);
   build.options_.points = build.points_.points;
-  if (BalView::serves(problem, options.fixed)) build.view_.emplace(problem, options.fixed);
+  build.kept_ = kept_points(problem.terms);
+  if (BalView::serves(problem, options.fixed) && !restates_terms(problem))
+    build.view_.emplace(problem, options.fixed);
   const Result<void> done =
       build.view_ ? build.plan_bal(problem, skip) : build.plan_lenses(problem, skip);
   if (!done.ok()) return done.error();
@@ -89,6 +129,7 @@ Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
 Result<void> Build::plan_bal(const Problem& problem, const std::vector<std::uint8_t>& skip) {
   Columns columns = number_columns(problem, fixed_images(problem, options_.fixed), view_->held());
   const bool only_images = options_.fixed.points && !has_rigid_frames(problem.rigs) &&
+                           problem.observation_sigma.empty() && problem.terms.empty() &&
                            !columns.lens_shared && options_.trust_region == TrustRegion::lm &&
                            options_.solver == CameraSolverKind::automatic;
   return only_images ? plan_images(problem, skip, std::move(columns))
@@ -112,15 +153,15 @@ Result<void> Build::plan_images(const Problem& problem, const std::vector<std::u
 Result<void> Build::plan_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
                                 Columns columns) {
   const bool held = options_.fixed.points;
-  Batches batches = arrange(problem, skip, *threads_);
+  Batches batches = arrange(problem, skipped(problem, skip, kept_), *threads_);
   view_->turn(problem, batches, *threads_);
   arranged_ = std::make_unique<Arrangement>();
-  if (has_rigid_frames(problem.rigs))
-    arranged_->map = map_rigs(problem, options_.fixed, columns, view_->turns());
+  arranged_->columns = columns;
+  map_blocks_of(problem, skip);
   Clusters clusters;
   WorkCounts counts = count_work(batches, columns, arranged_->map ? &*arranged_->map : nullptr,
                                  held, clusters, *threads_);
-  counts.weighted = options_.loss.kind != LossKind::none;
+  counts.weighted = options_.loss.kind != LossKind::none || batches.weighted();
   counts.dogleg = options_.trust_region == TrustRegion::dogleg;
   lends_ = lends_observations(problem, batches, options_, *threads_);
   const std::uint64_t lent = lends_ ? LentObservations::bytes(problem, !view_->turns()) : 0;
@@ -129,19 +170,22 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
   if (!choice.ok()) return choice.error();
   choice_ = std::move(choice).value();
   choice_.plan.clusters = std::move(clusters);
+  if (arranged_->map) join_kept(problem, kept_, *arranged_->map, choice_.plan.clusters);
   arranged_->batches = std::move(batches);
-  arranged_->columns = std::move(columns);
   return {};
 }
 
 Result<void> Build::plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip) {
-  Result<Arrangement> arranged = arrange_with_lenses(problem, options_.fixed, skip, *threads_);
+  Result<Arrangement> arranged =
+      arrange_with_lenses(problem, options_.fixed, skipped(problem, skip, kept_), *threads_);
   if (!arranged.ok()) return arranged.error();
   arranged_ = std::make_unique<Arrangement>(std::move(arranged).value());
+  map_blocks_of(problem, skip);
   Result<LensChoice> chosen = choose_for_lenses(*arranged_, options_, *threads_);
   if (!chosen.ok()) return chosen.error();
   choice_ = std::move(chosen.value().choice);
   arranged_->lists = std::move(chosen.value().chunks);
+  if (arranged_->map) join_kept(problem, kept_, *arranged_->map, choice_.plan.clusters);
   return {};
 }
 
@@ -149,8 +193,24 @@ void Build::lend(Problem& problem, std::optional<LentObservations>& lent) const 
   lent.emplace(problem, arranged_->batches, *threads_, !view_->turns());
 }
 
+void Build::map_blocks_of(const Problem& problem, const std::vector<std::uint8_t>& skip) {
+  if (!has_rigid_frames(problem.rigs) && problem.terms.empty()) return;
+  Arrangement& to = *arranged_;
+  const TermPlaces places = view_ ? TermPlaces::of_bal(problem) : TermPlaces::of_lenses(to.tracks);
+  terms_ = make_terms(problem, places, kept_, skip, view_ ? &*view_ : nullptr);
+  const auto kept = static_cast<std::uint32_t>(kept_.size());
+  to.row_columns = with_kept_points(to.columns, kept, options_.fixed.points);
+  to.map = map_blocks(problem, options_.fixed, to.row_columns, kept, view_ && view_->turns());
+  to.map->term_tiles = tiles_of(terms_);
+}
+
 CameraState Build::cameras(const Problem& problem) const {
-  return view_ ? view_->cameras(problem) : camera_state(problem);
+  CameraState out = view_ ? view_->cameras(problem) : camera_state(problem);
+  for (const std::uint32_t point : kept_) {
+    const double* X = &problem.points[3 * std::size_t(point)];
+    out.kept.push_back({X[0], X[1], X[2]});
+  }
+  return out;
 }
 
 std::unique_ptr<Home> Build::make_home(const Problem& problem) {
@@ -173,8 +233,12 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
   if (arranged_->map) {
     const SolverKind kind = choice_.plan.kind;
     const bool forms = kind != SolverKind::implicit_cg && kind != SolverKind::blocks;
-    rows =
-        std::make_unique<MappedRows>(std::move(rows), columns, *arranged_->map, forms, *threads_);
+    const std::size_t kept = kept_.size(), first_kept = columns.num_images();
+    if (!terms_.empty())
+      rows = std::make_unique<TermRows>(std::move(rows), std::move(terms_), columns, kept);
+    rows = std::make_unique<MappedRows>(std::move(rows), arranged_->row_columns, *arranged_->map,
+                                        forms, *threads_);
+    camera_columns.add_kept(arranged_->row_columns, first_kept, kept);
     camera_columns = camera_columns.through(*arranged_->map, problem.rigs);
   }
   return std::make_unique<PointSystem>(
@@ -190,6 +254,9 @@ void Build::store(const Home& home, Problem& problem) const {
   else
     sheaf::store(home.cameras(), problem);
   home.store_points(problem.points);
+  for (std::size_t j = 0; j < kept_.size(); ++j)
+    std::copy(home.cameras().kept[j].begin(), home.cameras().kept[j].end(),
+              &problem.points[3 * std::size_t(kept_[j])]);
   follow_images(problem);
   place_images(problem);
 }

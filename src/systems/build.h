@@ -17,6 +17,7 @@
 #include "systems/choose_points.h"
 #include "systems/choose_solver.h"
 #include "systems/home.h"
+#include "systems/term.h"
 
 namespace sheaf {
 
@@ -52,6 +53,8 @@ class Build {
   Result<void> plan_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
                            Columns columns);
   Result<void> plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip);
+  /// Where blocks of rows are not what is solved for: rigs, terms.
+  void map_blocks_of(const Problem& problem, const std::vector<std::uint8_t>& skip);
   CameraState cameras(const Problem& problem) const;
   bool watches_behind() const { return options_.cheirality != Cheirality::formula; }
 
@@ -64,6 +67,8 @@ class Build {
   std::unique_ptr<Arrangement> arranged_;
   Choice choice_;
   bool lends_ = false;
+  std::vector<std::uint32_t> kept_;  ///< points that are not eliminated
+  std::vector<std::unique_ptr<Term>> terms_;
 };
 
 /// The kernels of an instruction set. Errors: usage, this machine cannot run it.

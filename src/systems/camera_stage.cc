@@ -46,7 +46,7 @@ bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request, Ste
   cut_ = false;
   if (columns_.count == 0) return true;
   corrected_ = coarse_ && coarse_->factor(sums.of_rows != nullptr ? sums.of_rows : sums.diagonal,
-                                          damping_.data());
+                                          damping_.data(), sums.couplings);
   const CameraSolution solution = solver_->solve(system(sums, request), step_);
   ++solves_;
   step.linear_iterations = solution.iterations;

@@ -108,6 +108,13 @@ CameraColumns CameraColumns::of_lenses(const Columns& columns, const LensTracks&
   return out;
 }
 
+void CameraColumns::add_kept(const Columns& columns, std::size_t first_block, std::size_t count) {
+  for (std::size_t j = 0; j < count; ++j) {
+    const std::int32_t* c = columns.image(first_block + j);
+    kept_.push_back({c[0], c[1], c[2]});
+  }
+}
+
 CameraColumns CameraColumns::of_brightness(const Columns& columns) {
   CameraColumns out(columns, columns.num_images());
   for (std::size_t i = 0; i < columns.num_images(); ++i) {
@@ -131,6 +138,8 @@ CameraColumns CameraColumns::through(const BlockMap& map, const Rigs& rigs) cons
     p.column = map.solved_column[static_cast<std::size_t>(p.column)];
     out.add(p);
   }
+  for (std::array<std::int32_t, 3>& c : out.kept_)
+    for (std::int32_t& k : c) k = k < 0 ? k : map.solved_column[static_cast<std::size_t>(k)];
   for (std::size_t i = 0; i < poses_.size(); ++i) out.poses_[i] = columns_of(map.image_block[i]);
   for (const std::uint32_t block : map.sensor_block) out.sensors_.push_back(columns_of(block));
   for (const std::uint32_t block : map.frame_block) out.frames_.push_back(columns_of(block));
@@ -170,6 +179,17 @@ double CameraColumns::step(const CameraState& from, const Buffer<double>& x,
   largest = std::max(largest, step_poses(frames_, from.frames, x, to.frames));
   for (const Mounted& of : mounted_)
     to.poses[of.image] = composed(to.sensors[of.sensor], to.frames[of.frame]);
+  to.kept = from.kept;
+  for (std::size_t j = 0; j < kept_.size(); ++j) {
+    if (kept_[j][0] < 0) continue;
+    double moved = 0, length = 1e-300;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double d = x[static_cast<std::size_t>(kept_[j][k])];
+      to.kept[j][k] += d;
+      moved += d * d, length += from.kept[j][k] * from.kept[j][k];
+    }
+    largest = std::max(largest, std::sqrt(moved / length));
+  }
   to.sets = from.sets;
   for (const Parameter& p : parameters_) {
     const double change = x[static_cast<std::size_t>(p.column)];

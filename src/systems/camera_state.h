@@ -23,6 +23,7 @@ struct CameraState {
   std::vector<Parameters> sets;
   /// sensor_from_rig and rig_from_world: where an image has both, they give its pose.
   std::vector<RigidMotion<double>> sensors{}, frames{};
+  std::vector<std::array<double, 3>> kept{};  ///< points that are not eliminated
 };
 
 /// The poses and lenses of a problem.
@@ -59,6 +60,8 @@ class CameraColumns {
   static CameraColumns of_lenses(const Columns& columns, const LensTracks& tracks);
   /// The same, where solved blocks are frames and sensors; `rigs` says which images are of which.
   CameraColumns through(const BlockMap& map, const Rigs& rigs) const;
+  /// Kept points: columns 0 to 2 of these blocks.
+  void add_kept(const Columns& columns, std::size_t first_block, std::size_t count);
   /// Brightness a and b of each image: columns 6 and 7 of its block. b counts in grey levels of
   /// 255.
   static CameraColumns of_brightness(const Columns& columns);
@@ -81,9 +84,10 @@ class CameraColumns {
   double step_poses(const PoseColumns& columns, const std::vector<RigidMotion<double>>& from,
                     const Buffer<double>& x, std::vector<RigidMotion<double>>& to) const;
 
-  PoseColumns poses_;             ///< of each image
-  PoseColumns sensors_, frames_;  ///< of rigs
-  std::vector<Mounted> mounted_;  ///< images whose frame or sensor steps
+  PoseColumns poses_;                              ///< of each image
+  PoseColumns sensors_, frames_;                   ///< of rigs
+  std::vector<Mounted> mounted_;                   ///< images whose frame or sensor steps
+  std::vector<std::array<std::int32_t, 3>> kept_;  ///< of each kept point
   std::vector<Parameter> parameters_;
 };
 

@@ -140,7 +140,7 @@ Result<LensChoice> choose_for_lenses(const Arrangement& arranged, const SolveOpt
   const bool held = options.fixed.points;
   Clusters clusters;
   WorkCounts counts = estimate_lens_work(arranged, held, clusters, threads);
-  counts.weighted = options.loss.kind != LossKind::none;
+  counts.weighted = options.loss.kind != LossKind::none || arranged.batches.weighted();
   counts.dogleg = options.trust_region == TrustRegion::dogleg;
   const Batches& batches = arranged.batches;
   const LensTracks& tracks = arranged.tracks;

@@ -64,7 +64,7 @@ void DoglegPasses::sum_curvature(double lambda) {
     for (std::uint32_t c = slices[s]; c < slices[s + 1]; ++c)
       source_->curvature(chunks_.chunks[c], lambda, points_held_, outputs[s]);
   });
-  curvature_ = 0;
+  curvature_ = source_->other_curvature();
   for (const CurvatureOutput& out : outputs) {
     curvature_ += out.square_sum;
     gradient2_ += out.gradient2;

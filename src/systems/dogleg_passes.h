@@ -31,6 +31,8 @@ class DoglegSource {
   /// Adds |J v|^2 and the points' part of |v|_C^2.
   virtual void curvature(const Chunk& chunk, double lambda, bool points_held,
                          CurvatureOutput& out) = 0;
+  /// |J v|^2 of what is in no chunk.
+  virtual double other_curvature() const { return 0; }
   /// Sum over points of d^T D d, where they follow the step.
   virtual double point_damping(const Chunk& chunk) = 0;
 };

@@ -59,9 +59,12 @@ class MappedRows::Dogleg : public DoglegSource {
     of_rows_->write_steps(x_.data(), rows_.map_.row_blocks());
   }
   void gradient(const Chunk& chunk, double* sums) override { of_rows_->gradient(chunk, sums); }
-  void gather(const double* sums, std::size_t, double* solved) const override {
-    to_solved(rows_.map_, rows_.adjoints_, sums, solved);
+  void gather(const double* sums, std::size_t blocks, double* solved) const override {
+    std::vector<double> of_rows(kBlockVector * rows_.map_.row_blocks());
+    of_rows_->gather(sums, blocks, of_rows.data());
+    to_solved(rows_.map_, rows_.adjoints_, of_rows.data(), solved);
   }
+  double other_curvature() const override { return of_rows_->other_curvature(); }
   void curvature(const Chunk& chunk, double lambda, bool points_held,
                  CurvatureOutput& out) override {
     of_rows_->curvature(chunk, lambda, points_held, out);
@@ -80,7 +83,7 @@ MappedRows::MappedRows(std::unique_ptr<PointRows> rows, const Columns& columns, 
       columns_(columns),
       map_(map),
       threads_(threads),
-      fold_(map, rows_->chunks().tiles, forms_tiles, threads),
+      fold_(map, rows_->reduced_chunks().tiles, forms_tiles, threads),
       solved_(kBlockVector * map.columns.num_images()),
       of_rows_(kBlockVector * map.row_blocks()),
       row_columns_((static_cast<std::size_t>(columns.count) + 7) / 8 * 8) {
@@ -97,7 +100,8 @@ ReducedSums MappedRows::finish(double* tiles, double* diagonal) {
   const ReducedSums of_rows = rows_->finish(tiles, diagonal);
   row_diagonal_ = of_rows.diagonal;
   fold_.fold(adjoints_, of_rows.tiles, of_rows.diagonal);
-  return {&solved_chunks_, fold_.tile_sums(), fold_.diagonal(), of_rows.diagonal};
+  return {&solved_chunks_, fold_.tile_sums(), fold_.diagonal(), of_rows.diagonal,
+          of_rows.couplings};
 }
 
 CoarseSpace::State MappedRows::coarse_state() {
@@ -109,14 +113,16 @@ CoarseSpace::State MappedRows::coarse_state() {
     double* record = &records_[kCameraRecord * block];
     const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
     std::copy(R.begin(), R.end(), record);
-    std::copy(pose.translation.begin(), pose.translation.end(),
-              record + pose_record::kTranslation);
+    std::copy(pose.translation.begin(), pose.translation.end(), record + pose_record::kTranslation);
   };
   for (std::size_t f = 0; f < map_.frame_block.size(); ++f)
     write(map_.frame_block[f], held.frames[f]);
   for (std::size_t i = 0; i < map_.image_block.size(); ++i)
     write(map_.image_block[i], held.poses[i]);
-  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().data()};
+  for (std::uint32_t j = 0; j < map_.kept; ++j)
+    std::copy_n(held.kept[j].begin(), 3,
+                &records_[kCameraRecord * (map_.first_kept + std::size_t(j))]);
+  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().data(), map_.first_kept};
 }
 
 void MappedRows::step(const Buffer<double>& columns) {

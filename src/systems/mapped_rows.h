@@ -22,6 +22,8 @@ class MappedRows : public PointRows {
   const Batches& batches() const override { return rows_->batches(); }
   const Chunks& chunks() const override { return rows_->chunks(); }
   std::size_t num_blocks() const override { return rows_->num_blocks(); }
+  std::size_t more_blocks() const override { return rows_->more_blocks(); }
+  std::size_t more_tiles() const override { return rows_->more_tiles(); }
   const Chunks& reduced_chunks() const override { return solved_chunks_; }
   std::size_t scratch() const override { return rows_->scratch(); }
   bool keeps_metric() const override { return rows_->keeps_metric(); }

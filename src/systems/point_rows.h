@@ -78,6 +78,9 @@ class PointRows {
   virtual const Batches& batches() const = 0;
   virtual const Chunks& chunks() const = 0;    ///< with the tiles of the rows' own blocks
   virtual std::size_t num_blocks() const = 0;  ///< diagonal blocks
+  /// What finish() adds behind the sums of the rows: diagonal blocks and tiles.
+  virtual std::size_t more_blocks() const { return 0; }
+  virtual std::size_t more_tiles() const { return 0; }
   /// With the tiles that the camera solver sees.
   virtual const Chunks& reduced_chunks() const { return chunks(); }
   /// Doubles of scratch that a thread needs to eliminate a chunk.
@@ -103,7 +106,7 @@ class PointRows {
                             double* tiles, double* diagonal, EliminateOutput& out) = 0;
   /// Of the held state; summed: what elimination came to.
   virtual Costs held_costs(const Costs& summed) const { return summed; }
-  /// What the camera solver sees, from the sums of all slices.
+  /// What the camera solver sees, from the sums of all slices; there is room for more behind them.
   virtual ReducedSums finish(double* tiles, double* diagonal) {
     return {&chunks(), tiles, diagonal};
   }

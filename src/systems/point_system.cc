@@ -35,8 +35,11 @@ PointSystem::PointSystem(std::unique_ptr<PointRows> rows, Start start, const Num
   rows_->attach(state_);
   place_charts();
   state_.factors.allocate(kFactorGroup * rows_->batches().groups.size());
-  tiles_.allocate(num_slices() * kTileDoubles * rows_->chunks().tiles.size());
-  diagonal_.allocate(num_slices() * kDiagonalDoubles * rows_->num_blocks());
+  const auto room = [this](std::size_t of_rows, std::size_t more) {
+    return std::max(num_slices() * of_rows, of_rows + more);
+  };
+  tiles_.allocate(kTileDoubles * room(rows_->chunks().tiles.size(), rows_->more_tiles()));
+  diagonal_.allocate(kDiagonalDoubles * room(rows_->num_blocks(), rows_->more_blocks()));
   scratch_.resize(static_cast<std::size_t>(threads.count()));
   set_solver(plan, columns, kernels);
 }
@@ -45,8 +48,9 @@ void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const K
   const bool iterates =
       plan.kind == SolverKind::explicit_cg || plan.kind == SolverKind::implicit_cg;
   if (iterates && !rules_.held && plan.clusters.count > 0)
-    stage_.set_coarse(std::make_unique<CoarseSpace>(
-        rows_->batches(), *columns.coarse, rows_->map(), plan.clusters, num_slices(), kernels, threads_));
+    stage_.set_coarse(std::make_unique<CoarseSpace>(rows_->batches(), *columns.coarse, rows_->map(),
+                                                    plan.clusters, num_slices(), kernels,
+                                                    threads_));
   const Chunks& chunks = rows_->reduced_chunks();
   switch (plan.kind) {
     case SolverKind::blocks:
@@ -111,6 +115,7 @@ Step PointSystem::propose(const StepRequest& request) {
 Step PointSystem::linearize(const StepRequest& request) {
   rows_->begin(request);
   loss_ = request.loss;
+  loss_.weighted = rows_->batches().weighted();
   allocate_for_loss();
   chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
   std::vector<EliminateOutput> outputs(num_slices());
@@ -122,7 +127,7 @@ Step PointSystem::linearize(const StepRequest& request) {
 }
 
 void PointSystem::allocate_for_loss() {
-  const bool robust = loss_.kind != LossKind::none;
+  const bool robust = loss_.weighs();
   const Batches& batches = rows_->batches();
   const std::size_t metric =
       robust && rows_->keeps_metric() ? kMetricBatch * batches.num_batches() : 0;

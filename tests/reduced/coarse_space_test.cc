@@ -52,7 +52,7 @@ struct Linearised {
     coarse = std::make_unique<CoarseSpace>(batches, columns, nullptr, std::move(clusters),
                                            chunks.slices.size() - 1, kernels, threads);
     linearize(lambda, kernels);
-    factored = coarse->factor(diagonal.data(), damping.data());
+    factored = coarse->factor(diagonal.data(), damping.data(), {});
   }
 
   void fill_state() {
@@ -212,7 +212,7 @@ TEST(CoarseSpace, AMatrixThatIsKeptTakesTheNewDamping) {
   elsewhere.fill(1);
   l.coarse->begin({elsewhere.data()}, 5e-4);
   l.coarse->clear(0);
-  ASSERT_TRUE(l.coarse->factor(nullptr, l.damping.data()));
+  ASSERT_TRUE(l.coarse->factor(nullptr, l.damping.data(), {}));
   expect_same_correction(l, kernels.name);
 }
 

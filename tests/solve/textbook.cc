@@ -76,14 +76,17 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const
     Vector3<double> P = multiply(R, Vector3<double>{X[0], X[1], X[2]});
     for (int k = 0; k < 3; ++k) P[k] += p.poses[image].translation[k];
     const LensJacobian<double> j = project_with_jacobian(p.cameras[lens], P);
-    const double r[2] = {j.pixel[0] - p.observation_xy[2 * i],
-                         j.pixel[1] - p.observation_xy[2 * i + 1]};
+    const double by = p.observation_sigma.empty() ? 1 : 1 / p.observation_sigma[i];
+    const double r[2] = {by * (j.pixel[0] - p.observation_xy[2 * i]),
+                         by * (j.pixel[1] - p.observation_xy[2 * i + 1])};
     const LossValue<double> rho = evaluate_loss(loss, r[0] * r[0] + r[1] * r[1]);
     cost += rho.value / 2;
     const double w = std::sqrt(rho.first);
     for (int row = 0; row < 2; ++row) {
       std::vector<std::pair<int, double>> entries;
-      const Vector3<double> a = j.point[row], turn = cross(P, a);
+      Vector3<double> a = j.point[row];
+      for (double& x : a) x *= by;
+      const Vector3<double> turn = cross(P, a);
       Vector3<double> by_point{};
       for (int c = 0; c < 3; ++c) {
         entries.emplace_back(at.pose[6 * image + c], w * a[c]);
@@ -92,7 +95,7 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const
       }
       for (std::size_t c = 0; c < kMaxCameraParameters; ++c)
         if (const int place = at.lens[kMaxCameraParameters * lens + c]; place >= 0)
-          entries.emplace_back(place, w * j.parameters[row][c]);
+          entries.emplace_back(place, w * by * j.parameters[row][c]);
       if (charts.rules.base != ChartBase::none) by_point = charts.at(p, point).transpose(by_point);
       for (int c = 0; c < 3; ++c) entries.emplace_back(at.point[3 * point + c], w * by_point[c]);
       add_row(entries, w * r[row]);

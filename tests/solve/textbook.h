@@ -40,8 +40,6 @@ struct Normal {
   double cost = 0;
 
   Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const Charts& charts);
-
- private:
   void add_row(const std::vector<std::pair<int, double>>& entries, double r);
 };
 
