@@ -46,6 +46,33 @@ struct LensSceneOptions {
 /// Images are named. Errors: ErrorCode::usage when the counts or the field of view cannot be met.
 Result<Scene> generate(const LensSceneOptions& options);
 
+/// How the cameras of a rig are mounted.
+enum class RigKind : std::uint8_t {
+  stereo,  ///< in a row, half a unit apart, looking ahead
+  around,  ///< in a circle of radius 0.3, looking outwards
+};
+
+/// A synthetic scene of a rig that is driven along a street, one unit from frame to frame, between
+/// walls 5 to 8 units away; from some 150 frames on the street is a loop. docs/scenes.md says more.
+struct RigSceneOptions {
+  RigKind kind = RigKind::stereo;
+  std::uint64_t sensors =
+      0;  ///< of the rig; 0: 2 (stereo) or 6 (around). The first is the reference
+  std::uint64_t frames = 200;
+  CameraModel model = CameraModel::opencv;  ///< any but BAL
+  bool one_lens = false;                    ///< for all images; else each sensor has its own
+  double field_of_view_deg = 0;  ///< full angle; 0: 80 (stereo), 100 (around), 160 for wide models
+  double sensor_rotation_noise_rad = 0;  ///< of the start's sensor_from_rig, each component
+  double sensor_translation_noise = 0;   ///< likewise of its translation, scene units
+  double missing = 0;                    ///< part of the frames that lack the image of one sensor
+  std::uint64_t single_images = 0;       ///< of no rig, mixed in; they share a lens of their own
+  SceneOptions scene{};  ///< `images` is not looked at; the noises of poses are those of frames
+};
+
+/// Images of rigs have frames and sensors, and all are named. Errors: ErrorCode::usage when the
+/// counts or the field of view cannot be met.
+Result<Scene> generate(const RigSceneOptions& options);
+
 /// The two kinds of scenes that the published collections of bundle adjustment come from.
 enum class SceneFamily : std::uint8_t {
   street,      ///< a car's images along streets, in order, with loops driven again

@@ -5,108 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <type_traits>
 
-#include "geometry/camera_model.h"
 #include "platform/random.h"
-#include "scene/portable_number.h"
-#include "scene/portable_rotation.h"
+#include "scene/portable_pose.h"
+#include "scene/scene_lenses.h"
 
 namespace sheaf {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kNarrowDeg = 65, kWideDeg = 200;  // unless asked for
-constexpr double kMostNarrowDeg = 110, kMostWideDeg = 220;
 constexpr double kOrbitRadius = 4, kWideFromDeg = 120;
 
-enum Stream : std::uint64_t { kLenses = 1, kPlaces = 2 };
-
-bool is_fisheye(CameraModel model) {
-  switch (model) {
-    case CameraModel::opencv_fisheye:
-    case CameraModel::simple_radial_fisheye:
-    case CameraModel::radial_fisheye:
-    case CameraModel::thin_prism_fisheye:
-    case CameraModel::fov:
-    case CameraModel::eucm:
-      return true;
-    default:
-      return false;
-  }
-}
-
-/// Distortion as real lenses have it; perspective models lose a tenth at the corners of 65 degrees,
-/// and fisheyes grow monotonically to 110 degrees from the axis.
-double usual(CameraModel model, std::string_view name) {
-  const bool fisheye = is_fisheye(model);
-  if (name == "k") return fisheye ? -0.02 : -0.12;
-  if (name == "k1") return fisheye ? -0.02 : -0.15;
-  if (name == "k2") return fisheye ? 0.003 : 0.04;
-  if (name == "k3") return fisheye ? -6e-4 : -0.008;
-  if (name == "k4") return fisheye ? 5e-5 : 0.02;
-  if (name == "k5") return 0.01;
-  if (name == "k6") return 0.002;
-  if (name == "p1") return 6e-4;
-  if (name == "p2") return -4e-4;
-  if (name == "sx1") return 5e-4;
-  if (name == "sy1") return -3e-4;
-  if (name == "omega") return 0.9;
-  if (name == "alpha") return 0.62;
-  return name == "beta" ? 1.05 : 0;
-}
-
-std::array<double, 2> portable_pixel(const Camera& camera, const std::array<double, 3>& P) {
-  PortableNumber k[kMaxCameraParameters], at[3];
-  for (std::size_t i = 0; i < kMaxCameraParameters; ++i)
-    k[i] = PortableNumber(camera.parameters[i]);
-  for (std::size_t i = 0; i < 3; ++i) at[i] = PortableNumber(P[i]);
-  LensJacobian<PortableNumber> J;
-  with_lens(camera.model, [&](auto lens) {
-    if constexpr (!std::is_same_v<decltype(lens), BalLens>) lens.project(k, at, J);
-  });
-  return {J.pixel[0].value, J.pixel[1].value};
-}
-
-/// A lens whose image is as large as its sensor: the diagonal of a 3:2 frame spans the field of
-/// view, or the circle of a fisheye fills a square one.
-Camera usual_lens(CameraModel model, double half_view_rad) {
-  const bool square = is_fisheye(model);
-  Camera lens{model, {}, square ? 1600u : 1800u, square ? 1600u : 1200u};
-  const std::vector<std::string_view> names = parameter_names(model);
-  for (std::size_t i = 0; i < names.size(); ++i) lens.parameters[i] = usual(model, names[i]);
-  const ParameterRoles role = roles_of(model);
-  auto& k = lens.parameters;
-  const auto at = [](int i) { return static_cast<std::size_t>(i); };
-  k[at(role.fx)] = k[at(role.fy)] = 1;
-  const SineCosine edge = portable_sine_cosine(half_view_rad);
-  const double reach = portable_pixel(lens, {edge.sine, 0, edge.cosine})[0];
-  const double w = static_cast<double>(lens.width_px), h = static_cast<double>(lens.height_px);
-  k[at(role.fx)] = (square ? w / 2 - 20 : std::sqrt(w * w + h * h) / 2) / reach;
-  k[at(role.fy)] = role.fy == role.fx ? k[at(role.fx)] : 1.004 * k[at(role.fx)];
-  k[at(role.cx)] = w / 2 + 6.5;
-  k[at(role.cy)] = h / 2 - 4.25;
-  return lens;
-}
-
-/// Rows are the camera's axes in the world: z along `ahead`, x turned by `roll` from the horizon.
-Quaternion<double> looking(Vector3<double> ahead, double roll_rad) {
-  const auto unit = [](Vector3<double> v) {
-    const double n = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    return Vector3<double>{v[0] / n, v[1] / n, v[2] / n};
-  };
-  const Vector3<double> z = unit(ahead);
-  const Vector3<double> aside =
-      std::abs(z[2]) < 0.9 ? Vector3<double>{0, 0, 1} : Vector3<double>{1, 0, 0};
-  const Vector3<double> level = unit(cross(z, aside)), down = cross(z, level);
-  const SineCosine roll = portable_sine_cosine(roll_rad);
-  Vector3<double> x, y;
-  for (std::size_t i = 0; i < 3; ++i) {
-    x[i] = roll.cosine * level[i] + roll.sine * down[i];
-    y[i] = roll.cosine * down[i] - roll.sine * level[i];
-  }
-  return portable_quaternion(Matrix3<double>{x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]});
-}
+enum Stream : std::uint64_t { kPlaces = 2 };
 
 Vector3<double> in_camera(const Matrix3<double>& R, const Vector3<double>& t,
                           const Vector3<double>& X) {
@@ -115,24 +25,7 @@ Vector3<double> in_camera(const Matrix3<double>& R, const Vector3<double>& t,
   return P;
 }
 
-Pose pose_at(const Quaternion<double>& rotation, const Vector3<double>& centre) {
-  const Vector3<double> t = multiply(portable_matrix(rotation), centre);
-  return {rotation, {-t[0], -t[1], -t[2]}};
-}
-
 }  // namespace
-
-Result<double> field_of_view_deg(const LensSceneOptions& options) {
-  const bool fisheye = is_fisheye(options.model);
-  const double most = fisheye ? kMostWideDeg : kMostNarrowDeg;
-  const double view = options.field_of_view_deg;
-  if (view == 0) return fisheye ? kWideDeg : kNarrowDeg;
-  if (view >= 5 && view <= most) return view;
-  return Error(ErrorCode::usage, "the field of view of a synthetic " +
-                                     std::string(to_string(options.model)) +
-                                     " lens must be from 5 to " +
-                                     std::to_string(static_cast<int>(most)) + " degrees");
-}
 
 LensScene::LensScene(const LensSceneOptions& options)
     : images_(static_cast<std::uint32_t>(options.scene.images)) {
@@ -140,23 +33,9 @@ LensScene::LensScene(const LensSceneOptions& options)
   half_view_rad_ = view / 2 * kDegree;
   cosine_ = portable_sine_cosine(half_view_rad_).cosine;
   wide_ = view >= kWideFromDeg;
-  const CameraModel model = options.model == CameraModel::bal ? CameraModel::radial : options.model;
-  const Camera first = usual_lens(model, half_view_rad_);
   const std::uint64_t count =
       options.lenses == 0 ? images_ : std::min<std::uint64_t>(options.lenses, images_);
-  Random lens_random(options.scene.seed, kLenses);
-  const ParameterRoles role = roles_of(model);
-  for (std::uint64_t c = 0; c < count; ++c) {
-    Camera lens = first;
-    const double zoom = 1 + 0.02 * lens_random.normal();
-    for (int i = 0; i < static_cast<int>(parameter_count(model)); ++i) {
-      double& k = lens.parameters[static_cast<std::size_t>(i)];
-      const double other = lens_random.normal();
-      if (c == 0 || i == role.cx || i == role.cy) continue;
-      k *= i == role.fx || i == role.fy ? std::clamp(zoom, 0.9, 1.1) : 1 + 0.05 * other;
-    }
-    lenses_.push_back(lens);
-  }
+  lenses_ = draw_lenses(options.model, half_view_rad_, count, options.scene.seed);
   Random random(options.scene.seed, kPlaces);
   wide_ ? place_below(random) : place_around(random);
   for (const Pose& pose : poses_) rotations_.push_back(portable_matrix(pose.rotation));

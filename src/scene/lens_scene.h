@@ -46,7 +46,4 @@ class LensScene {
   std::vector<Matrix3<double>> rotations_;
 };
 
-/// Errors: ErrorCode::usage for a field of view that the model does not have.
-Result<double> field_of_view_deg(const LensSceneOptions& options);
-
 }  // namespace sheaf

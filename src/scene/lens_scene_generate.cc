@@ -6,19 +6,19 @@
 #include <string>
 #include <utility>
 
-#include "geometry/camera_model.h"
 #include "platform/random.h"
 #include "scene/camera_frame.h"
 #include "scene/lens_scene.h"
-#include "scene/portable_rotation.h"
 #include "scene/scene_checks.h"
+#include "scene/scene_lenses.h"
+#include "scene/scene_noise.h"
 #include "scene/track_lengths.h"
 
 namespace sheaf {
 namespace {
 
 // Streams of the seed: another amount of one noise leaves everything else as it is.
-enum Stream : std::uint64_t { kPlaces = 12, kLengths, kPixels, kPoses, kPoints, kLenses };
+enum Stream : std::uint64_t { kPlaces = 12, kLengths, kPixels, kPoses, kPoints };
 
 constexpr std::uint32_t kFewest = 12;  ///< observations of an image, where there are points enough
 constexpr int kAttempts = 200;         ///< to place a point that two images see
@@ -134,44 +134,9 @@ Problem make_truth(const LensScene& scene, const std::vector<Track>& tracks,
   return truth;
 }
 
-Vector3<double> normal3(Random& random, double deviation) {
-  const double x = random.normal(), y = random.normal(), z = random.normal();
-  return {deviation * x, deviation * y, deviation * z};
-}
-
-/// R <- exp(phi) R, C <- C + d; t = -R C = exp(phi) (t - R d).
 void disturb_poses(const SceneOptions& o, Problem& start) {
   Random random(o.seed, kPoses);
-  for (Pose& pose : start.poses) {
-    const Quaternion<double> turn = portable_quaternion(normal3(random, o.rotation_noise_rad));
-    const Vector3<double> moved =
-        multiply(portable_matrix(pose.rotation), normal3(random, o.center_noise));
-    Vector3<double> t = pose.translation;
-    for (std::size_t i = 0; i < 3; ++i) t[i] -= moved[i];
-    pose.translation = multiply(portable_matrix(turn), t);
-    pose.rotation = normalized(multiply(turn, pose.rotation));
-  }
-}
-
-/// Focal lengths by their noise; what bends rays by ten times as much of its size. Principal points
-/// stay: by default they are not refined.
-void disturb_lenses(const SceneOptions& o, Problem& start) {
-  Random random(o.seed, kLenses);
-  for (Camera& lens : start.cameras) {
-    const ParameterRoles role = roles_of(lens.model);
-    const double zoom = std::clamp(1 + o.focal_noise * random.normal(), 0.5, 2.0);
-    for (int i = 0; i < static_cast<int>(parameter_count(lens.model)); ++i) {
-      double& k = lens.parameters[static_cast<std::size_t>(i)];
-      const double other = std::clamp(1 + 10 * o.focal_noise * random.normal(), 0.5, 1.5);
-      if (i == role.fx || i == role.fy) {
-        k *= zoom;
-      } else if (i != role.cx && i != role.cy) {
-        k *= other;
-      }
-    }
-    // The domain of EUCM, and of what it sees, ends at alpha = 1.
-    if (lens.model == CameraModel::eucm) lens.parameters[4] = std::min(lens.parameters[4], 0.75);
-  }
+  for (Pose& pose : start.poses) disturb_pose(random, o.rotation_noise_rad, o.center_noise, pose);
 }
 
 }  // namespace
