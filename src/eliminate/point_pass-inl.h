@@ -142,6 +142,27 @@ HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
   for (int i = 0; i < factor_group::kFields; ++i) store(all[i], out + 8 * i);
 }
 
+/// The rows of batch b as the loss has them, `room` being what source.rows() left there; `weight` is
+/// one over their sigma, if they have one.
+template <class Source>
+HWY_INLINE void weigh_rows(const EliminationOf<typename Source::State>& in, const Source& source,
+                           const GroupPart& of, std::uint64_t b, const LaneChart* chart,
+                           const V* weight, double* room, const EliminateOutput& out,
+                           LaneJacobian& j, MetricLessDiagonal& less, V& cost) {
+  const V s = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
+  LossRows rows(LossLanes(in.how.loss), j.r, s);
+  Metric metric = metric_of(rows.rho, j.r, s);
+  if (weight != nullptr) {
+    rows.weigh_columns(*weight);
+    metric = weighed(metric, *weight);
+  }
+  less.add(j, metric, chart);
+  apply_loss(rows, j);
+  if constexpr (Source::kMostBlocks > 0) source.apply_loss_to_others(rows, room);
+  cost = hn::Add(cost, rows.rho.value);
+  store_metric(metric, out.metric + kMetricBatch * b + of.lane());
+}
+
 template <class Source, bool kRobust, bool kCharted, class GroupRecords>
 HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, const GroupPart& of,
                                const GroupRecords& to, const EliminateOutput& out,
@@ -152,6 +173,7 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   const V mask = of.mask();
   const V* scale = of.full() ? nullptr : &mask;
   [[maybe_unused]] LaneChart chart;
+  [[maybe_unused]] const LaneChart* const charted = kCharted ? &chart : nullptr;
   if constexpr (kCharted) {
     V base[3];
     base_of<Source>(in.how.chart, in.of, of, base);
@@ -160,37 +182,25 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   PointSums p;
   p.clear();
   [[maybe_unused]] MetricLessDiagonal less{{zero(), zero(), zero()}};
-  [[maybe_unused]] V cost = zero();
+  [[maybe_unused]] V cost = zero(), weight;
   V square = sums.square[of.part], robust = sums.loss[of.part];
   const double* rows = nullptr;
   double* const room = Source::room(to);
-  [[maybe_unused]] const bool sigmas = in.of.batches->inverse_sigma.size() > 0;
+  // Rows that are kept have been weighed.
+  [[maybe_unused]] const Batches& batches = *in.of.batches;
+  const bool sigmas = kRobust && Source::kEvaluates && batches.inverse_sigma.size() > 0;
   for (std::uint32_t o = 0; o < of.track; ++o) {
     const std::uint64_t b = of.first_batch + o;
-    LaneJacobian j = source.rows(b, scale, room + source.stride() * o);
-    [[maybe_unused]] V weight;
-    if constexpr (kRobust && Source::kEvaluates)
-      if (sigmas) {
-        weight = inverse_sigma_of(*in.of.batches, of, b);
-        for (V& r : j.r) r = hn::Mul(r, weight);
-      }
-    if constexpr (Source::kEvaluates) square = Source::add_square(j, square);
-    if constexpr (kRobust) {
-      const V s = fma(j.r[0], j.r[0], hn::Mul(j.r[1], j.r[1]));
-      LossRows rows(LossLanes(in.how.loss), j.r, s);
-      Metric metric = metric_of(rows.rho, j.r, s);
-      if constexpr (Source::kEvaluates)
-        if (sigmas) {
-          rows.weigh_columns(weight);
-          metric = weighed(metric, weight);
-        }
-      less.add(j, metric, kCharted ? &chart : nullptr);
-      apply_loss(rows, j);
-      if constexpr (Source::kMostBlocks > 0)
-        source.apply_loss_to_others(rows, room + source.stride() * o);
-      cost = hn::Add(cost, rows.rho.value);
-      store_metric(metric, out.metric + kMetricBatch * b + of.lane());
+    double* const here = room + source.stride() * o;
+    LaneJacobian j = source.rows(b, scale, here);
+    if (sigmas) {
+      weight = inverse_sigma_of(batches, of, b);
+      for (V& r : j.r) r = hn::Mul(r, weight);
     }
+    if constexpr (Source::kEvaluates) square = Source::add_square(j, square);
+    if constexpr (kRobust)
+      weigh_rows<Source>(in, source, of, b, charted, sigmas ? &weight : nullptr, here, out, j, less,
+                         cost);
     if constexpr (kCharted)
       for (V* row : {j.point[0], j.point[1]}) chart.transpose(row);
     p.add(j);
@@ -198,9 +208,9 @@ HWY_INLINE void eliminate_part(const EliminationOf<typename Source::State>& in, 
   }
   sums.square[of.part] = square;
   if constexpr (kRobust && Source::kEvaluates)
-    if (in.of.batches->prior.size() > 0) {
-      const PriorRows own(*in.of.batches, of, X);
-      add_prior(own, kCharted ? &chart : nullptr, p);
+    if (batches.prior.size() > 0) {
+      const PriorRows own(batches, of, X);
+      add_prior(own, charted, p);
       cost = hn::Add(cost, own.square());
     }
   if constexpr (kRobust) {

@@ -191,9 +191,10 @@ class Attempts {
   Recourse find_better(const Build& build, const Home& home) {
     // A state that fits to a twentieth of a pixel is not far from anything.
     const bool near = rms(summary_.iterations.back().cost, used_) < 0.05;
-    // Starts move images one by one.
-    const bool rigid = has_rigid_frames(problem_.rigs);
-    if (options_.recoveries == 0 || near || rigid || steps_of(summary_) >= options_.max_iterations)
+    // Starts move images one by one and know nothing but pixels.
+    const bool more = has_rigid_frames(problem_.rigs) || !problem_.terms.empty() ||
+                      !problem_.observation_sigma.empty();
+    if (options_.recoveries == 0 || near || more || steps_of(summary_) >= options_.max_iterations)
       return Recourse::none;
     --options_.recoveries;
     start_ = estimate_of(problem_);
