@@ -38,12 +38,19 @@ std::string alignment_text(const StateAlignment& a) {
 }  // namespace
 
 Json errors_json(const StateErrors& errors) {
+  const auto of_rigs = [&](const ErrorStatistics& e) {
+    return errors.has_rigs ? error_json(e) : Json();
+  };
   return {{"aligned", errors.aligned},
           {"scale", number(errors.scale)},
           {"rotation_error_rad", error_json(errors.rotation_error_rad)},
           {"translation_error", error_json(errors.translation_error)},
           {"center_error", error_json(errors.center_error)},
-          {"point_error", error_json(errors.point_error)}};
+          {"point_error", error_json(errors.point_error)},
+          {"frame_rotation_error_rad", of_rigs(errors.frame_rotation_error_rad)},
+          {"frame_center_error", of_rigs(errors.frame_center_error)},
+          {"sensor_rotation_error_rad", of_rigs(errors.sensor_rotation_error_rad)},
+          {"sensor_translation_error", of_rigs(errors.sensor_translation_error)}};
 }
 
 std::string errors_csv(const ErrorLists& lists) {
@@ -67,6 +74,11 @@ std::string errors_text(const ErrorLists& lists) {
   out += error_line("translation (of t)", errors.translation_error);
   out += error_line("camera centre", errors.center_error);
   out += error_line("point", errors.point_error);
+  if (!errors.has_rigs) return out;
+  out += error_line("frame rotation (rad)", errors.frame_rotation_error_rad);
+  out += error_line("frame centre", errors.frame_center_error);
+  out += error_line("sensor rotation (rad)", errors.sensor_rotation_error_rad);
+  out += error_line("sensor translation", errors.sensor_translation_error);
   return out;
 }
 

@@ -31,6 +31,7 @@ struct Arguments {
   SceneOptions scene;
   FamilyArguments family;
   LensArguments lens;
+  RigArguments rigs;
   PhotometricSceneArguments photometric;
   std::string out, truth;
   std::set<std::string> given;  ///< names of the options that were
@@ -51,9 +52,13 @@ bool is_point_cloud(std::filesystem::path path) {
   return path.extension() == ".ply";
 }
 
-// A scene of named lenses is a COLMAP model where its name does not say otherwise.
+bool is_model(const Arguments& arguments) {
+  return arguments.lens.chosen() || arguments.rigs.chosen();
+}
+
+// A scene of rigs or of named lenses is a COLMAP model where its name does not say otherwise.
 WriteOptions format_of(const std::string& path, const Arguments& arguments) {
-  const bool model = arguments.lens.chosen() && std::filesystem::path(path).extension().empty();
+  const bool model = is_model(arguments) && std::filesystem::path(path).extension().empty();
   return {.format = model ? "colmap" : ""};
 }
 
@@ -75,6 +80,9 @@ StreamedScene stream_to(CountingSink& sink, const FamilyOptions& options, SceneS
 
 Made make(const Arguments& arguments, Interrupt& interrupt) {
   interrupt.begin_write();
+  if (arguments.rigs.chosen())
+    return write_whole(
+        generate(rig_options(arguments.rigs, arguments.lens, arguments.scene)).value(), arguments);
   if (arguments.lens.chosen())
     return write_whole(generate(lens_options(arguments.lens, arguments.scene)).value(), arguments);
   if (!arguments.family.chosen()) return write_whole(generate(arguments.scene).value(), arguments);
@@ -97,6 +105,7 @@ Json document_of(const Arguments& arguments, const Made& made, double total_s) {
                    {"truth", arguments.truth.empty() ? Json() : Json(arguments.truth)}};
   document["options"].update(family_json(arguments.family, arguments.scene));
   document["options"].update(lens_json(arguments.lens));
+  document["options"].update(rig_json(arguments.rigs, arguments.lens));
   document.update(made.counts);
   document.update(statistics_json(made.statistics));
   document["rms_px"] = number(made.rms_px);
@@ -110,7 +119,7 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  const bool folders = arguments.lens.chosen();
+  const bool folders = is_model(arguments);
   check_outputs(
       {{"OUT", arguments.out, folders}, {"--truth", arguments.truth, folders}, {"--json", json}});
   const Made made = make(arguments, interrupt);
@@ -158,6 +167,8 @@ Verb generate_verb() {
             "  sheaf generate street.txt --like ladybug-138\n"
             "\nA COLMAP model of 500 images through one fisheye:\n"
             "  sheaf generate model --camera OPENCV_FISHEYE --shared --cameras 500 --points 20000\n"
+            "\nA COLMAP model of six cameras around that drive along a street:\n"
+            "  sheaf generate drive --rigs around --frames 100 --points 10000\n"
             "\nImages of a textured surface, poses and points for sheaf photometric:\n"
             "  sheaf generate scene --photometric --truth truth"};
   verb.places = bound<Arguments>(
@@ -165,7 +176,7 @@ Verb generate_verb() {
                {.name = "OUT",
                 .placeholder = "FILE",
                 .help = "the disturbed start: BAL, .gz and .bz2 compressed; a folder with --camera "
-                        "(a COLMAP model) and --photometric"})},
+                        "and --rigs (a COLMAP model) and --photometric"})},
       *a);
   verb.options = joined(
       {bound<Arguments>(
@@ -175,7 +186,7 @@ Verb generate_verb() {
                                                 "pixels"})},
            *a),
        bound(scene_fields(), a->scene), options_of(a->family), options_of(a->lens),
-       options_of(a->photometric), options_of(a->common)});
+       options_of(a->rigs), options_of(a->photometric), options_of(a->common)});
   remember_given(verb.options, a->given);
   verb.run = [a] { return a->photometric.chosen ? run_photometric(*a) : run(*a); };
   return verb;

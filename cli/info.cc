@@ -106,6 +106,9 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
              input.read_s);
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   fmt::print("lenses      {}\n", lenses_text(input.problem));
+  if (const RigCounts rigs = rig_counts(input.problem); rigs.rigid_frames > 0)
+    fmt::print("rigs        {} with {} sensors, {} frames, {} of {} images\n", rigs.rigs,
+               rigs.sensors, rigs.frames, rigs.images, input.problem.num_images());
   fmt::print("cost        {:.9e}\n", evaluation.cost);
   fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
              evaluation.rms_px, statistics.mean_error_px);
@@ -140,6 +143,11 @@ int run(const Arguments& arguments) {
   document["lenses"] = Json::array();
   for (const auto& [model, count] : lenses_of(input.problem))
     document["lenses"].push_back({{"model", model}, {"count", count}});
+  const RigCounts rigs = rig_counts(input.problem);
+  document["rigs"] = {{"count", rigs.rigs},
+                      {"sensors", rigs.sensors},
+                      {"frames", rigs.frames},
+                      {"images", rigs.images}};
   document["cost"] = number(evaluation.cost);
   document["rms_px"] = number(evaluation.rms_px);
   document["mean_error_px"] = number(statistics.mean_error_px);

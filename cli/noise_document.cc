@@ -16,6 +16,8 @@ Json noise_json(const NoiseOptions& o) {
           {"translation", o.translation},
           {"center", o.center},
           {"point", o.point},
+          {"sensor_rotation_rad", o.sensor_rotation_rad},
+          {"sensor_translation", o.sensor_translation},
           {"intrinsics", o.intrinsics},
           {"intrinsics_relative", o.intrinsics_relative},
           {"pixel_px", o.pixel_px},
@@ -35,6 +37,8 @@ std::string noise_text(const NoiseOptions& o) {
   add("translations", o.translation, "");
   add("centres", o.center, "");
   add("points", o.point, "");
+  add("sensors turned", o.sensor_rotation_rad, " rad");
+  add("sensors moved", o.sensor_translation, "");
   const char* const names[] = {"f", "k1", "k2"};
   for (std::size_t k = 0; k < 3; ++k) {
     add(names[k], o.intrinsics[k], k == 0 ? " px" : "");

@@ -93,6 +93,94 @@ Json lens_json(const LensArguments& a) {
           {"field_of_view_deg", a.field_of_view_deg > 0 ? Json(a.field_of_view_deg) : Json()}};
 }
 
+std::vector<BoundOption> options_of(RigArguments& arguments) {
+  using F = FieldsOf<RigArguments>;
+  using A = RigArguments;
+  const auto sigma = [](double A::*at, const char* name, const char* unit, const char* help) {
+    return F::real(at, {.name = name,
+                        .placeholder = "SIGMA",
+                        .unit = unit,
+                        .range = from(0),
+                        .help = help,
+                        .needs = {"rigs"}});
+  };
+  return bound<A>(
+      {F::name(&A::kind, {{"stereo", "cameras side by side"}, {"around", "cameras in a circle"}},
+               {.name = "rigs",
+                .placeholder = "KIND",
+                .nothing = true,
+                .help = "a COLMAP model as OUT of a rig that drives along a street (docs/rigs.md), "
+                        "through lenses of --camera (not given: OPENCV), one for each sensor",
+                .excludes = {"like", "family", "outliers", "drift", "lenses", "cameras",
+                             "photometric"}}),
+       F::unless_zero(&A::sensors, {.name = "rig-sensors",
+                                    .placeholder = "N",
+                                    .range = between(1, 100),
+                                    .help = "cameras of the rig; not given: 2 (stereo), 6 (around)",
+                                    .needs = {"rigs"}}),
+       F::whole(&A::frames, {.name = "frames",
+                             .placeholder = "N",
+                             .range = from(2),
+                             .help = "moments at which the rig takes images, one unit apart",
+                             .needs = {"rigs"}}),
+       F::real(&A::missing, {.name = "missing",
+                             .placeholder = "F",
+                             .range = between(0, 1),
+                             .help = "part of the frames that lack the image of one sensor",
+                             .needs = {"rigs"}}),
+       F::whole(&A::single_images, {.name = "single-images",
+                                    .placeholder = "N",
+                                    .range = from(0),
+                                    .help = "images of no rig, mixed in",
+                                    .needs = {"rigs"}}),
+       sigma(&A::sensor_rotation_rad, "sensor-rotation-noise", "rad",
+             "of the start's rotations of sensor_from_rig"),
+       sigma(&A::sensor_translation, "sensor-translation-noise", "",
+             "of the start's translations of sensor_from_rig, scene units")},
+      arguments);
+}
+
+RigSceneOptions rig_options(const RigArguments& a, const LensArguments& lens,
+                            const SceneOptions& scene) {
+  RigSceneOptions options;
+  options.kind = a.kind == "around" ? RigKind::around : RigKind::stereo;
+  options.sensors = a.sensors;
+  options.frames = a.frames;
+  if (lens.chosen()) options.model = *camera_model_named(lens.camera);
+  options.one_lens = lens.shared;
+  options.field_of_view_deg = lens.field_of_view_deg;
+  options.sensor_rotation_noise_rad = a.sensor_rotation_rad;
+  options.sensor_translation_noise = a.sensor_translation;
+  options.missing = a.missing;
+  options.single_images = a.single_images;
+  options.scene = scene;
+  return options;
+}
+
+Json rig_json(const RigArguments& a, const LensArguments& lens) {
+  if (!a.chosen())
+    return {{"rigs", nullptr},
+            {"rig_sensors", nullptr},
+            {"frames", nullptr},
+            {"missing", nullptr},
+            {"single_images", nullptr},
+            {"sensor_rotation_noise_rad", nullptr},
+            {"sensor_translation_noise", nullptr}};
+  const RigSceneOptions o = rig_options(a, lens, {});
+  return {
+      {"rigs", a.kind},
+      {"rig_sensors", a.sensors > 0 ? Json(a.sensors) : Json(o.kind == RigKind::stereo ? 2 : 6)},
+      {"frames", a.frames},
+      {"missing", a.missing},
+      {"single_images", a.single_images},
+      {"sensor_rotation_noise_rad", a.sensor_rotation_rad},
+      {"sensor_translation_noise", a.sensor_translation},
+      {"family", nullptr},
+      {"cameras", nullptr},
+      {"camera", std::string(to_string(o.model))},
+      {"lenses", lens.shared ? 1 : 0}};
+}
+
 FamilyOptions family_options(const FamilyArguments& a, const SceneOptions& scene) {
   FamilyOptions options;
   if (!a.like.empty()) {

@@ -38,6 +38,26 @@ LensSceneOptions lens_options(const LensArguments& arguments, const SceneOptions
 /// `null`s where no such scene was asked for.
 Json lens_json(const LensArguments& arguments);
 
+/// Scenes of rigs; points, noises and seed are those of the SceneOptions, model and field of view
+/// those of the LensArguments.
+struct RigArguments {
+  std::string kind;  ///< "stereo" or "around"; empty: no such scene
+  std::uint64_t sensors = 0;
+  std::uint64_t frames = RigSceneOptions().frames;
+  double missing = 0;
+  std::uint64_t single_images = 0;
+  double sensor_rotation_rad = 0, sensor_translation = 0;
+  bool chosen() const { return !kind.empty(); }
+};
+
+/// --rigs, --rig-sensors, --frames, --missing, --single-images, --sensor-rotation-noise and
+/// --sensor-translation-noise.
+std::vector<BoundOption> options_of(RigArguments& arguments);
+RigSceneOptions rig_options(const RigArguments& rigs, const LensArguments& lens,
+                            const SceneOptions& scene);
+/// `null`s where no such scene was asked for; else also what differs from that of lenses.
+Json rig_json(const RigArguments& rigs, const LensArguments& lens);
+
 /// Throws Error (ErrorCode::usage) for a name that is not known.
 FamilyOptions family_options(const FamilyArguments& arguments, const SceneOptions& scene);
 

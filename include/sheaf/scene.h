@@ -148,6 +148,8 @@ struct NoiseOptions {
   double translation = 0;                       ///< each component of t, scene units
   double center = 0;                            ///< each component of C, scene units
   double point = 0;                             ///< each coordinate, scene units
+  double sensor_rotation_rad = 0;               ///< each component of phi, of a rig's sensors
+  double sensor_translation = 0;                ///< each component of t, of a rig's sensors
   std::array<double, 3> intrinsics{};           ///< of f (px), k1, k2
   std::array<double, 3> intrinsics_relative{};  ///< likewise, as parts of the parameter's size
   double pixel_px = 0;                          ///< each component of a measurement
@@ -176,9 +178,12 @@ struct NoiseRecord {
 };
 
 /// Disturbs a problem as NoiseOptions say: normalisation, images, lenses, points, pixels, outliers,
-/// depth filter. Outliers are the observations of least rank in a random order: those of a smaller
-/// fraction are among those of a larger one, and move alike. Errors: ErrorCode::usage for options
-/// that are negative or not finite, or not of the protocol; the problem is then as it was.
+/// depth filter. Images of a rig move with their frame, which takes the noise of its first image;
+/// sensors (but references) turn about their centres by R <- exp(phi) R, then t <- t + e. Frames of
+/// one image, taken by the reference, are as images of no rig. Outliers are the observations of
+/// least rank in a random order: those of a smaller fraction are among those of a larger one, and
+/// move alike. Errors: ErrorCode::usage for options that are negative or not finite, not of the
+/// protocol, or of sensors that there are not; the problem is then as it was.
 Result<NoiseRecord> perturb(Problem& problem, const NoiseOptions& options);
 
 /// Moves the scene so that the median of each coordinate of the points is 0, and scales it so that

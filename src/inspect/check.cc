@@ -11,9 +11,11 @@
 #include "inspect/clean.h"
 #include "inspect/lens_findings.h"
 #include "inspect/lens_reach.h"
+#include "inspect/rig_findings.h"
 #include "inspect/statistics.h"
 #include "scene/camera_plane.h"
 #include "scene/point_errors.h"
+#include "scene/rigs.h"
 
 namespace sheaf {
 namespace {
@@ -39,9 +41,11 @@ class Parts {
 };
 
 void check_parts(const Problem& problem, FindingList& list) {
-  const std::size_t images = problem.num_images();
-  Parts parts(images + problem.num_points());
+  const std::size_t images = problem.num_images(), frames = images + problem.num_points();
+  Parts parts(frames + problem.rigs.num_frames());
   std::vector<bool> sees(images, false);
+  for (std::size_t j = 0; j < images; ++j)
+    if (in_rig(problem.rigs, j)) parts.join(j, frames + problem.rigs.image_frame[j]);
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
     parts.join(problem.observation_image[i], images + problem.observation_point[i]);
     sees[problem.observation_image[i]] = true;
@@ -67,7 +71,9 @@ void check_images(const Problem& problem, FindingList& list) {
   std::vector<std::uint32_t> seen(problem.num_images(), 0);
   for (const std::uint32_t j : problem.observation_image) ++seen[j];
   Numbers blind, weak;
+  const std::vector<std::uint32_t> frames = rigid_frames_of(problem);
   for (std::size_t j = 0; j < seen.size(); ++j) {
+    if (frames[j] != Rigs::kNone) continue;  // what counts is what the frame's images see together
     if (seen[j] == 0) blind.push_back(j);
     if (seen[j] > 0 && seen[j] < kFewPoints) weak.push_back(j);
   }
@@ -101,6 +107,25 @@ void check_points(const Problem& problem, FindingList& list) {
                " degrees: their depth is hardly determined; leave them out (convert --min-angle)");
 }
 
+/// Of images, of frames that move several, and of sensors.
+std::uint64_t moving_poses(const Problem& problem) {
+  const std::vector<std::uint32_t> frames = rigid_frames_of(problem);
+  std::vector<bool> counted(problem.rigs.num_frames(), false),
+      sensors(problem.rigs.num_sensors(), false);
+  std::uint64_t poses = 0;
+  for (std::size_t j = 0; j < frames.size(); ++j) {
+    if (frames[j] == Rigs::kNone) {
+      ++poses;
+      continue;
+    }
+    const std::uint32_t sensor = problem.rigs.image_sensor[j];
+    if (!counted[frames[j]]) ++poses;
+    if (!sensors[sensor] && problem.rigs.is_reference[sensor] == 0) ++poses;
+    counted[frames[j]] = sensors[sensor] = true;
+  }
+  return poses;
+}
+
 /// More unknowns than measurements, whatever their arrangement; the 7 of the gauge are free.
 void check_rank(const Problem& problem, FindingList& list) {
   std::uint64_t lenses = 0;
@@ -110,7 +135,7 @@ void check_rank(const Problem& problem, FindingList& list) {
     const ParameterRoles roles = roles_of(problem.cameras[c].model);
     if (used[c]) lenses += 1u + (roles.fy != roles.fx) + (roles.k1 >= 0) + (roles.k2 >= 0);
   }
-  const std::uint64_t unknowns = 6 * problem.num_images() + 3 * problem.num_points() + lenses;
+  const std::uint64_t unknowns = 6 * moving_poses(problem) + 3 * problem.num_points() + lenses;
   const std::uint64_t measured = 2 * problem.num_observations();
   if (measured + 7 >= unknowns) return;
   list.findings.push_back(
@@ -202,6 +227,7 @@ std::vector<Finding> check(const Problem& problem) {
   FindingList list;
   check_parts(problem, list);
   check_images(problem, list);
+  check_rigs(problem, list);
   check_points(problem, list);
   check_rank(problem, list);
   check_duplicates(problem, list);

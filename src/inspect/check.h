@@ -10,10 +10,10 @@
 namespace sheaf {
 
 /// Looks for what makes a problem ill-posed, slow to solve or wrong: parts that nothing joins,
-/// images and points with too few measurements, measurements that occur twice or lie where no image
-/// can hold them, points behind cameras, in their planes and at their centres, rays that hardly
-/// meet, absurd focal lengths and distortion, lenses that fold back, residuals far off. Grave ones
-/// first.
+/// images, frames, sensors and points with too few measurements, measurements that occur twice or
+/// lie where no image can hold them, points behind cameras, in their planes and at their centres,
+/// rays that hardly meet, absurd focal lengths and distortion, lenses that fold back, residuals far
+/// off. Grave ones first.
 std::vector<Finding> check(const Problem& problem);
 
 }  // namespace sheaf

@@ -13,7 +13,7 @@ struct Finding {
   std::string code;   ///< "parts", "weak-images", ...: stable, docs/json.md lists them
   bool grave = true;  ///< false: worth a look, and common in good problems
   std::uint64_t count = 0;
-  std::string of;                    ///< "images", "points", "observations", "lenses" or "unknowns"
+  std::string of;  ///< "images", "points", "observations", "lenses", "frames", ...
   std::vector<std::uint64_t> first;  ///< numbers of the first 1000 of them
   std::string words;                 ///< what is wrong, and what to do
 };

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "scene/point_errors.h"
+#include "scene/rigs.h"
 
 namespace sheaf {
 namespace {
@@ -53,11 +54,22 @@ Statistics statistics_of(const Problem& problem) {
   return out;
 }
 
+RigCounts rig_counts(const Problem& problem) {
+  const Rigs& rigs = problem.rigs;
+  RigCounts out{rigs.count, rigs.num_frames(), rigs.num_sensors()};
+  if (rigs.empty()) return out;
+  for (std::size_t j = 0; j < problem.num_images(); ++j) out.images += in_rig(rigs, j) ? 1 : 0;
+  for (const std::uint8_t trivial : trivial_frames(rigs)) out.rigid_frames += trivial == 0 ? 1 : 0;
+  return out;
+}
+
 std::uint64_t size_bytes(const Problem& p) {
   const std::uint64_t arrays = bytes_of(p.poses) + bytes_of(p.image_camera) + bytes_of(p.cameras) +
                                bytes_of(p.points) + bytes_of(p.observation_image) +
                                bytes_of(p.observation_point) + bytes_of(p.observation_xy) +
-                               bytes_of(p.bal_angle_axis);
+                               bytes_of(p.bal_angle_axis) + bytes_of(p.observation_sigma) +
+                               bytes_of(p.rigs.sensor_from_rig) + bytes_of(p.rigs.rig_from_world) +
+                               bytes_of(p.rigs.image_frame) + bytes_of(p.rigs.image_sensor);
   if (p.metadata == nullptr) return arrays;
   const SceneMetadata& m = *p.metadata;
   return arrays + bytes_of(m.camera_ids) + bytes_of(m.image_ids) + bytes_of(m.image_names) +

@@ -28,6 +28,14 @@ struct Statistics {
 };
 Statistics statistics_of(const Problem& problem);
 
+/// What of a problem is mounted together.
+struct RigCounts {
+  std::uint64_t rigs = 0, frames = 0, sensors = 0;
+  std::uint64_t images = 0;        ///< that are of a frame
+  std::uint64_t rigid_frames = 0;  ///< that are more than the pose of one image
+};
+RigCounts rig_counts(const Problem& problem);
+
 /// Bytes that the problem's arrays hold.
 std::uint64_t size_bytes(const Problem& problem);
 

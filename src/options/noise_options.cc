@@ -139,6 +139,11 @@ Table make_table() {
       sigma(&O::translation, "translation", "", "of each component of t, scene units"),
       sigma(&O::center, "center", "", "of each component of a camera centre, scene units"),
       sigma(&O::point, "point", "", "of each coordinate of a point, scene units"),
+      sigma(&O::sensor_rotation_rad, "sensor-rotation", "rad",
+            "of each component of a rotation vector of sensor_from_rig; images of rigs move with "
+            "their frames"),
+      sigma(&O::sensor_translation, "sensor-translation", "",
+            "of each component of sensor_from_rig's translation, scene units"),
       intrinsics_field(),
       sigma(&O::pixel_px, "pixel", "px", "of each component of a measurement")};
   for (const Table& part : {outlier_fields(), filter_fields()})

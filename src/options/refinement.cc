@@ -13,6 +13,7 @@
 
 #include "options/refinement_items.h"
 #include "options/words.h"
+#include "scene/rigs.h"
 
 namespace sheaf {
 namespace {
@@ -23,7 +24,8 @@ using Part = RefinementItem::Part;
 /// single one.
 int narrowness(const RefinementItem& item, bool pattern) {
   const int reach = item.who.empty() ? 0 : pattern ? 10 : 20;
-  const bool whole = item.part == Part::lens || item.part == Part::image;
+  const bool whole =
+      item.part == Part::lens || item.part == Part::image || item.part == Part::sensor;
   return reach + (whole ? 0 : item.part == Part::parameter ? 2 : 1);
 }
 
@@ -33,6 +35,7 @@ struct Resolved {
   int narrowness = 0;
   bool points = false;
   std::vector<std::uint32_t> images;                            ///< poses
+  std::vector<std::uint32_t> sensors;                           ///< of rigs
   std::vector<std::pair<std::uint32_t, std::uint16_t>> lenses;  ///< parameters of lenses
 };
 
@@ -74,7 +77,24 @@ Error absent_parameter(const RefinementItem& item, const Problem& problem,
   return refusal_of(item, "no camera that is meant has this parameter" + models);
 }
 
+Result<Resolved> resolve_sensors(const RefinementItem& item, const Problem& problem) {
+  Resolved out;
+  out.item = &item;
+  Result<Named> found = Named();
+  if (item.who.empty()) {
+    for (std::uint32_t s = 0; s < problem.rigs.num_sensors(); ++s)
+      if (problem.rigs.is_reference[s] == 0) found.value().indices.push_back(s);
+  } else {
+    found = sensors_named(item, problem);
+  }
+  if (!found.ok()) return found.error();
+  out.narrowness = narrowness(item, found.value().pattern);
+  out.sensors = std::move(found.value().indices);
+  return out;
+}
+
 Result<Resolved> resolve(const RefinementItem& item, const Problem& problem) {
+  if (item.part == Part::sensor) return resolve_sensors(item, problem);
   Resolved out;
   out.item = &item;
   Result<Named> found = Named();
@@ -106,13 +126,16 @@ class Decisions {
  public:
   Decisions(const Problem& problem, const std::vector<Resolved>& resolved)
       : resolved_(resolved), images_(problem.num_images()) {
-    last_.assign(1 + images_ + kMaxCameraParameters * problem.cameras.size(), 0);
+    sensors_ = 1 + images_ + kMaxCameraParameters * problem.cameras.size();
+    last_.assign(sensors_ + problem.rigs.num_sensors(), 0);
   }
   static constexpr std::size_t kPoints = 0;
   static std::size_t pose(std::uint32_t image) { return 1 + image; }
   std::size_t parameter(std::uint32_t lens, int k) const {
     return 1 + images_ + kMaxCameraParameters * lens + static_cast<std::size_t>(k);
   }
+
+  std::size_t sensor(std::uint32_t s) const { return sensors_ + s; }
 
   /// Later calls are narrower, or as narrow.
   void decide(std::size_t what, std::uint32_t by) {
@@ -128,7 +151,7 @@ class Decisions {
 
  private:
   const std::vector<Resolved>& resolved_;
-  std::size_t images_;
+  std::size_t images_, sensors_;
   std::vector<std::uint32_t> last_;  ///< 1 + index into resolved_; 0: nobody
   std::string contradiction_;
 };
@@ -140,6 +163,9 @@ Refinement by_default(const Problem& problem) {
   const BitsOfModels centres = bits_of_models(centre), lenses = bits_of_models(lens);
   Refinement out;
   out.poses.assign(problem.num_images(), true);
+  out.named.assign(problem.num_images(), false);
+  for (const std::uint8_t reference : problem.rigs.is_reference)
+    out.sensors.push_back(reference == 0);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const std::size_t m = model_number(problem, c);
     out.lenses.push_back(static_cast<std::uint16_t>(lenses[m] & ~centres[m]));
@@ -156,6 +182,11 @@ void apply(const Resolved& resolved, std::uint32_t number, Decisions& decisions,
   for (const std::uint32_t j : resolved.images) {
     decisions.decide(Decisions::pose(j), number);
     out.poses[j] = refine;
+    out.named[j] = !resolved.item->who.empty();
+  }
+  for (const std::uint32_t s : resolved.sensors) {
+    decisions.decide(decisions.sensor(s), number);
+    out.sensors[s] = refine;
   }
   for (const auto& [c, bits] : resolved.lenses) {
     for (unsigned left = bits; left != 0; left &= left - 1)
@@ -193,6 +224,27 @@ Result<std::vector<RefinementItem>> parse_all(const RefinementArguments& a) {
   return items;
 }
 
+/// Poses of single images and frames into the list of what is held.
+void hold_images(const Refinement& refinement, const Problem& problem, Fixed& out) {
+  const Rigs& rigs = problem.rigs;
+  const std::vector<std::uint8_t> trivial = trivial_frames(rigs);
+  enum : char { kUntouched, kHeld, kMoves };
+  std::vector<char> frames(rigs.num_frames(), kUntouched);
+  for (std::uint32_t j = 0; j < problem.num_images(); ++j) {
+    const bool held = refinement.poses[j] == 0;
+    if (!in_rig(rigs, j) || trivial[rigs.image_frame[j]] != 0) {
+      if (held && !out.poses) out.pose_ids.push_back(j);
+      continue;
+    }
+    if (held && refinement.named[j] != 0) out.pose_ids.push_back(j);
+    char& frame = frames[rigs.image_frame[j]];
+    if (frame != kMoves) frame = held ? kHeld : kMoves;
+  }
+  if (out.poses) return;
+  for (std::uint32_t f = 0; f < frames.size(); ++f)
+    if (frames[f] == kHeld) out.frame_ids.push_back(f);
+}
+
 OptionSpec item_spec(const char* name, const std::string& help, bool refine) {
   return {.name = name,
           .placeholder = "LIST",
@@ -212,7 +264,8 @@ OptionTable<RefinementArguments> refinement_fields(const std::string& of_fix) {
               item_spec("fix",
                         of_fix + ": a comma-separated list of points, poses, intrinsics, f, k "
                                  "(distortion), pp (principal "
-                                 "point) or a parameter's name (fx, k1, ...); of named ones as "
+                                 "point), sensor_from_rig or a parameter's name (fx, k1, ...); of "
+                                 "named ones as "
                                  "pose=WHO, camera=WHO, image=WHO (both), f=WHO, ...; WHO is a "
                                  "camera's or image's id, an image's name, or a pattern as "
                                  "'left/*'",
@@ -244,9 +297,14 @@ Fixed fixed_of(const Refinement& refinement, const Problem& problem) {
   Fixed out;
   out.points = !refinement.points;
   out.poses = std::none_of(refinement.poses.begin(), refinement.poses.end(), moves);
-  if (!out.poses)
-    for (std::uint32_t j = 0; j < problem.num_images(); ++j)
-      if (!moves(refinement.poses[j])) out.pose_ids.push_back(j);
+  hold_images(refinement, problem, out);
+  for (std::uint32_t s = 0; s < problem.rigs.num_sensors(); ++s)
+    if (!moves(refinement.sensors[s]) && problem.rigs.is_reference[s] == 0)
+      out.sensor_ids.push_back(s);
+  const auto free = std::count(problem.rigs.is_reference.begin(), problem.rigs.is_reference.end(),
+                               std::uint8_t{0});
+  out.sensors = free > 0 && static_cast<std::ptrdiff_t>(out.sensor_ids.size()) == free;
+  if (out.sensors) out.sensor_ids.clear();
   for (const std::uint16_t free : refinement.lenses)
     out.parameters.push_back(static_cast<ParameterSet>(~unsigned{free}));
   return out;
@@ -259,6 +317,15 @@ std::string held_text(const Refinement& refinement, const Problem& problem) {
   if (held > 0)
     parts.push_back("poses of " + std::to_string(held) + " of " +
                     std::to_string(problem.num_images()) + " images");
+  std::size_t sensors = 0, free_sensors = 0;
+  for (std::size_t s = 0; s < problem.rigs.num_sensors(); ++s) {
+    if (problem.rigs.is_reference[s] != 0) continue;
+    ++sensors;
+    free_sensors += refinement.sensors[s] != 0 ? 1 : 0;
+  }
+  if (free_sensors < sensors)
+    parts.push_back("sensor_from_rig of " + std::to_string(sensors - free_sensors) + " of " +
+                    std::to_string(sensors) + " sensors");
   std::map<std::string, std::size_t> lenses;
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     std::vector<std::string_view> names = parameter_names(problem.cameras[c].model);

@@ -9,31 +9,34 @@
 #include <charconv>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "options/words.h"
+#include "scene/rigs.h"
 
 namespace sheaf {
 namespace {
 
 using Part = RefinementItem::Part;
 
-const std::map<std::string, Part, std::less<>> kParts = {
-    {"points", Part::points},
-    {"poses", Part::poses},
-    {"pose", Part::poses},
-    {"image", Part::image},
-    {"intrinsics", Part::lens},
-    {"camera", Part::lens},
-    {"f", Part::focal},
-    {"focal", Part::focal},
-    {"k", Part::distortion},
-    {"distortion", Part::distortion},
-    {"pp", Part::principal_point},
-    {"principal-point", Part::principal_point}};
+const std::map<std::string, Part, std::less<>> kParts = {{"points", Part::points},
+                                                         {"poses", Part::poses},
+                                                         {"pose", Part::poses},
+                                                         {"image", Part::image},
+                                                         {"intrinsics", Part::lens},
+                                                         {"camera", Part::lens},
+                                                         {"f", Part::focal},
+                                                         {"focal", Part::focal},
+                                                         {"k", Part::distortion},
+                                                         {"distortion", Part::distortion},
+                                                         {"pp", Part::principal_point},
+                                                         {"principal-point", Part::principal_point},
+                                                         {"sensor_from_rig", Part::sensor}};
 
 const char kExpected[] =
     "points, poses, intrinsics, f (or focal), k (or distortion), pp (or principal-point), a "
-    "parameter as fx or k1, each but points also as NAME=WHO, or image=WHO, pose=WHO, camera=WHO; "
+    "parameter as fx or k1, sensor_from_rig (of rigs), each but points also as NAME=WHO, or "
+    "image=WHO, pose=WHO, camera=WHO; "
     "WHO is an id, an image's name or a pattern of names";
 
 /// Only of named ones, or only of all.
@@ -183,6 +186,35 @@ Result<Named> lenses_named(const RefinementItem& item, const Problem& problem) {
   std::sort(named.indices.begin(), named.indices.end());
   named.indices.erase(std::unique(named.indices.begin(), named.indices.end()), named.indices.end());
   return named;
+}
+
+Result<Named> sensors_named(const RefinementItem& item, const Problem& problem) {
+  const SceneMetadata& metadata = metadata_of(problem);
+  const Rigs& rigs = problem.rigs;
+  if (rigs.num_sensors() == 0) return refusal_of(item, "there are no rigs");
+  std::set<std::uint32_t> sensors;
+  std::uint32_t id = 0;
+  const bool is_id = parse_id(item.who, id);
+  if (metadata.sensor_ids.empty()) {
+    if (is_id && id < rigs.num_sensors()) sensors.insert(id);
+  } else if (is_id) {
+    for (std::uint32_t s = 0; s < metadata.sensor_ids.size(); ++s)
+      if (metadata.sensor_ids[s] == id) sensors.insert(s);
+  }
+  Named named;
+  if (sensors.empty()) {
+    named = by_name(item.who, metadata.image_names);
+    for (const std::uint32_t j : named.indices)
+      if (in_rig(rigs, j)) sensors.insert(rigs.image_sensor[j]);
+  }
+  if (sensors.empty())
+    return refusal_of(item, "no sensor of a rig has the id " + item.who +
+                                ", and no image of a rig is called " + item.who + "; of sensors, " +
+                                ids_text(metadata.sensor_ids, rigs.num_sensors()) + "; " +
+                                names_text(metadata.image_names));
+  std::erase_if(sensors, [&](std::uint32_t s) { return rigs.is_reference[s] != 0; });
+  if (sensors.empty()) return refusal_of(item, "it is the reference of its rig, which never moves");
+  return Named{{sensors.begin(), sensors.end()}, named.pattern};
 }
 
 }  // namespace sheaf

@@ -14,7 +14,17 @@ namespace sheaf {
 
 /// One item of what is refined or fixed.
 struct RefinementItem {
-  enum class Part { points, poses, image, lens, focal, distortion, principal_point, parameter };
+  enum class Part {
+    points,
+    poses,
+    image,
+    lens,
+    focal,
+    distortion,
+    principal_point,
+    parameter,
+    sensor
+  };
   Part part = Part::points;
   std::string parameter{};  ///< its name, where the part is one
   std::string who{};        ///< a name, a pattern or an id; empty: all
@@ -41,5 +51,9 @@ struct Named {
 Result<Named> images_named(const RefinementItem& item, const Problem& problem);
 /// Lenses by id (likewise), or those of images by name or pattern. Errors: likewise.
 Result<Named> lenses_named(const RefinementItem& item, const Problem& problem);
+/// Sensors of rigs by the ids of their cameras (in a problem that states none: by number from 0),
+/// or those of images by name or pattern. References are left out, as they never move. Errors:
+/// likewise, and for what names references alone.
+Result<Named> sensors_named(const RefinementItem& item, const Problem& problem);
 
 }  // namespace sheaf

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "geometry/rotation.h"
+#include "report/rig_errors.h"
 #include "scene/camera_frame.h"
 
 namespace sheaf {
@@ -25,7 +26,8 @@ double distance(const Vector3<double>& a, const Vector3<double>& b) {
 
 std::vector<Vector3<double>> centers_of(const Problem& problem) {
   std::vector<Vector3<double>> out;
-  for (const Pose& pose : problem.poses) {
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const Pose pose = pose_of(problem, j);
     Vector3<double> c = multiply(matrix_from_quaternion(conjugate(pose.rotation)),
                                  Vector3<double>(pose.translation));
     for (double& x : c) x = -x;
@@ -125,6 +127,12 @@ Result<Problem> in_order_of(const Problem& reference, const Problem& estimate) {
   ordered.cameras = estimate.cameras;
   for (const std::size_t j : *images)
     ordered.add_image(estimate.poses[j], estimate.image_camera[j]);
+  ordered.rigs = estimate.rigs;
+  if (!ordered.rigs.empty())
+    for (std::size_t k = 0; k < images->size(); ++k) {
+      ordered.rigs.image_frame[k] = estimate.rigs.image_frame[(*images)[k]];
+      ordered.rigs.image_sensor[k] = estimate.rigs.image_sensor[(*images)[k]];
+    }
   for (const std::size_t p : *points)
     ordered.add_point(estimate.points[3 * p], estimate.points[3 * p + 1],
                       estimate.points[3 * p + 2]);
@@ -156,8 +164,8 @@ Result<ErrorLists> list_errors(const Problem& given, const Problem& reference, A
   const Similarity& similarity = out.alignment.similarity;
   const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
   for (std::size_t j = 0; j < estimate.num_images(); ++j) {
-    const Pose& want = reference.poses[j];
-    Pose have = estimate.poses[j];
+    const Pose want = pose_of(reference, j);
+    Pose have = pose_of(estimate, j);
     if (looks_along_minus_z(estimate, j) != looks_along_minus_z(reference, j))
       turn_round(have, false);
     const Quaternion<double> q =
@@ -175,6 +183,7 @@ Result<ErrorLists> list_errors(const Problem& given, const Problem& reference, A
   const auto points = points_of(estimate), reference_points = points_of(reference);
   for (std::size_t i = 0; i < points.size(); ++i)
     out.point.push_back(distance(similarity(points[i]), reference_points[i]));
+  out.rigs = list_rig_errors(estimate, reference, similarity);
   return out;
 }
 
@@ -184,7 +193,12 @@ StateErrors summarise(const ErrorLists& lists) {
           statistics_of_errors(lists.rotation_rad),
           statistics_of_errors(lists.translation),
           statistics_of_errors(lists.center),
-          statistics_of_errors(lists.point)};
+          statistics_of_errors(lists.point),
+          !lists.rigs.frame_center.empty(),
+          statistics_of_errors(lists.rigs.frame_rotation_rad),
+          statistics_of_errors(lists.rigs.frame_center),
+          statistics_of_errors(lists.rigs.sensor_rotation_rad),
+          statistics_of_errors(lists.rigs.sensor_translation)};
 }
 
 Result<StateErrors> compare_states(const Problem& estimate, const Problem& reference,

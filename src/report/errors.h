@@ -34,12 +34,23 @@ struct StateAlignment {
   std::size_t inliers = 0;  ///< of them, with `robust`; all of them otherwise
 };
 
+/// Of frames (rotation and centre of rig_from_world) and of sensors that are no references
+/// (rotation and translation of sensor_from_rig, the latter times the alignment's scale), in
+/// radians and scene units of the reference. Empty where not both problems have frames of several
+/// images, or where these do not group the images alike. Frames and sensors are told by their
+/// images.
+struct RigErrorLists {
+  std::vector<double> frame_rotation_rad, frame_center;         ///< one for each frame with images
+  std::vector<double> sensor_rotation_rad, sensor_translation;  ///< likewise for each sensor
+};
+
 /// Each error: a rotation's angle in radians, |t - t_reference|, distances of camera centres and
 /// points. Scene units are the reference's.
 struct ErrorLists {
   StateAlignment alignment;
   std::vector<double> rotation_rad, translation, center;  ///< one for each image
   std::vector<double> point;
+  RigErrorLists rigs;
 };
 
 /// Images and points are told by their names and ids where both problems state them, and then lists
@@ -55,6 +66,11 @@ struct StateErrors {
   ErrorStatistics translation_error;
   ErrorStatistics center_error;
   ErrorStatistics point_error;
+  bool has_rigs = false;  ///< whether there is something to compare in the next four
+  ErrorStatistics frame_rotation_error_rad;
+  ErrorStatistics frame_center_error;
+  ErrorStatistics sensor_rotation_error_rad;
+  ErrorStatistics sensor_translation_error;
 };
 StateErrors summarise(const ErrorLists& lists);
 

@@ -10,6 +10,8 @@
 
 #include "geometry/camera_model.h"
 #include "platform/random.h"
+#include "scene/rig_noise.h"
+#include "scene/rigs.h"
 #include "scene/subset.h"
 #include "scene/view.h"
 #include "sheaf/scene.h"
@@ -29,6 +31,8 @@ Result<void> check_numbers(const NoiseOptions& o) {
       {"translation noise", o.translation},
       {"centre noise", o.center},
       {"point noise", o.point},
+      {"rotation noise of sensors", o.sensor_rotation_rad},
+      {"translation noise of sensors", o.sensor_translation},
       {"noise of f", o.intrinsics[0]},
       {"noise of k1", o.intrinsics[1]},
       {"noise of k2", o.intrinsics[2]},
@@ -89,15 +93,29 @@ void disturb_image(Problem& problem, std::size_t j, const NoiseOptions& o,
   set_rotation(problem, j, portable_angle_axis(multiply(turn, before)));
 }
 
+// Every image draws its numbers; of a frame that moves several images, or a sensor's, those of the
+// first are the frame's.
 void disturb_images(Problem& problem, const NoiseOptions& o) {
   Random rotations(o.seed, kRotations), translations(o.seed, kTranslations),
       centers(o.seed, kCenters);
+  Rigs& rigs = problem.rigs;
+  const std::vector<std::uint8_t> trivial = trivial_frames(rigs);
+  std::vector<bool> moved(rigs.num_frames(), false);
   if (o.rotation_rad > 0) problem.bal_angle_axis.resize(3 * problem.num_images());
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
-    disturb_image(problem, j, o, normal3(rotations, o.rotation_rad), normal3(centers, o.center));
-    Vector3<double>& t = problem.poses[j].translation;
-    if (o.translation > 0) t = sum(t, normal3(translations, o.translation));
+    const Vector3<double> phi = normal3(rotations, o.rotation_rad), d = normal3(centers, o.center);
+    const Vector3<double> e =
+        o.translation > 0 ? normal3(translations, o.translation) : Vector3<double>{};
+    const bool rigid = in_rig(rigs, j) && trivial[rigs.image_frame[j]] == 0;
+    if (rigid && moved[rigs.image_frame[j]]) continue;
+    if (rigid) moved[rigs.image_frame[j]] = true;
+    Pose& pose = rigid ? rigs.rig_from_world[rigs.image_frame[j]] : problem.poses[j];
+    rigid ? disturb_frame(pose, o, phi, d) : disturb_image(problem, j, o, phi, d);
+    if (o.translation > 0) pose.translation = sum(pose.translation, e);
   }
+  follow_images(problem);
+  disturb_sensors(rigs, o);
+  place_images(problem);
 }
 
 // f (fx and fy alike), k1 and k2; what a model does not have draws its number all the same.
@@ -207,12 +225,16 @@ NoiseOptions published_noise(NoiseProtocol protocol) {
 Result<NoiseRecord> perturb(Problem& problem, const NoiseOptions& options) {
   if (Result<void> good = check(options); !good.ok()) return good.error();
   if (Result<void> good = validate(problem); !good.ok()) return good.error();
+  const bool sensors = options.sensor_rotation_rad > 0 || options.sensor_translation > 0;
+  if (sensors && !has_free_sensors(problem.rigs))
+    return refusal("there is no rig with sensors beside its reference, which never moves");
   NoiseRecord record;
   if (options.normalize_to > 0) {
     Result<Normalization> normalization = normalize(problem, options.normalize_to);
     if (!normalization.ok()) return normalization.error();
     record.normalization = normalization.value();
   }
+  place_images(problem);
   disturb_images(problem, options);
   disturb_lenses(problem, options);
   add_noise(problem.points, options.point, options.seed, kPoints);

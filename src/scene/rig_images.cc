@@ -67,7 +67,9 @@ double view_deg_of(const RigSceneOptions& o) {
 }
 
 RigImages::RigImages(const RigSceneOptions& options)
-    : street_(static_cast<double>(options.frames), options.scene.seed), frames_(options.frames) {
+    : street_(static_cast<double>(options.frames), options.scene.seed),
+      frames_(options.frames),
+      looks_back_(options.kind == RigKind::around) {
   const double half_view_rad = view_deg_of(options) / 2 * kDegree;
   cosine_ = portable_sine_cosine(half_view_rad).cosine;
   const std::uint64_t sensors = sensors_of(options);
@@ -153,9 +155,11 @@ void RigImages::add_image(std::uint64_t frame, std::uint32_t of_frame, std::uint
   names_.push_back(name);
 }
 
-double RigImages::reach() const {
-  // The last images of a drive that ends look ahead.
-  return static_cast<double>(frames_) + (street_.closed() ? 0 : 12);
+RigImages::Reach RigImages::reach() const {
+  // A drive that ends sees some of the street before its first frame and beyond its last.
+  const double last = static_cast<double>(frames_);
+  if (street_.closed()) return {0, last};
+  return {looks_back_ ? -12.0 : 0.0, last + 12};
 }
 
 std::vector<std::uint32_t> RigImages::near(double s) const {

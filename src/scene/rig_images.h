@@ -19,12 +19,14 @@ class RigImages {
   const RigStreet& street() const { return street_; }
   /// Lenses, images, rigs and names; no points.
   const Problem& problem() const { return problem_; }
-  /// Way along the street from which points are to be taken, scene units.
-  double reach() const;
+  /// Ways along the street between which points are to be taken, scene units.
+  struct Reach {
+    double from = 0, to = 0;
+  };
+  Reach reach() const;
 
   /// Images of the frames within `kRange` of the way s, in order.
   std::vector<std::uint32_t> near(double s) const;
-  std::uint64_t frame_at(std::uint32_t image) const { return place_[image]; }
   /// Frames between two, the short way round.
   double frames_between(std::uint32_t image, std::uint32_t other) const;
 
@@ -46,6 +48,7 @@ class RigImages {
   RigStreet street_;
   double cosine_;  ///< of half the field of view
   std::uint64_t frames_;
+  bool looks_back_;  ///< some sensor does
   Problem problem_;
   std::vector<std::string> names_;
   std::vector<std::uint64_t> place_;        ///< of each image: the frame that it was taken at

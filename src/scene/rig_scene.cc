@@ -96,6 +96,7 @@ Result<std::vector<Track>> make_tracks(const SceneOptions& o, const RigImages& i
   const std::vector<std::uint32_t> lengths =
       draw_track_lengths(o.points, o.mean_track, longest, length_random);
   std::vector<Track> tracks(o.points);
+  const RigImages::Reach reach = images.reach();
   std::uint64_t owed = 0;  // observations that tracks so far could not have
   for (std::uint64_t i = 0; i < o.points; ++i) {
     Track& track = tracks[i];
@@ -105,7 +106,7 @@ Result<std::vector<Track>> make_tracks(const SceneOptions& o, const RigImages& i
         (static_cast<double>(i) + random.uniform()) / static_cast<double>(o.points);
     bool found = false;
     for (int attempt = 0; attempt < kAttempts && !found; ++attempt) {
-      track.s = share * images.reach() + attempt * random.uniform(-0.1, 0.1);
+      track.s = reach.from + share * (reach.to - reach.from) + attempt * random.uniform(-0.1, 0.1);
       track.spot = images.street().spot(track.s, random);
       track.sights = choose_sights(images, track.spot, track.s, length, random);
       found = has_parallax(images, track);

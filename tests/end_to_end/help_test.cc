@@ -22,10 +22,31 @@ std::set<std::string> options_of(const std::string& verb) {
   std::set<std::string> options = kCommon;
   if (verb == "generate" || verb == "demo") options.insert(kScene.begin(), kScene.end());
   if (verb == "generate")
-    options.insert({"--truth", "--like", "--family", "--outliers", "--drift", "--photometric",
-                    "--wavelength", "--relief", "--grey-noise", "--brightness", "--vignette",
-                    "--occluder", "--start", "--measured", "--camera", "--shared", "--lenses",
-                    "--field-of-view"});
+    options.insert({"--truth",
+                    "--like",
+                    "--family",
+                    "--outliers",
+                    "--drift",
+                    "--photometric",
+                    "--wavelength",
+                    "--relief",
+                    "--grey-noise",
+                    "--brightness",
+                    "--vignette",
+                    "--occluder",
+                    "--start",
+                    "--measured",
+                    "--camera",
+                    "--shared",
+                    "--lenses",
+                    "--field-of-view",
+                    "--rigs",
+                    "--rig-sensors",
+                    "--frames",
+                    "--missing",
+                    "--single-images",
+                    "--sensor-rotation-noise",
+                    "--sensor-translation-noise"});
   if (verb == "photometric")
     options.insert({"--output",
                     "--ply",
@@ -75,7 +96,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
                     "--outliers", "--outlier-size", "--seed", "--protocol", "--normalize",
-                    "--min-depth"});
+                    "--min-depth", "--sensor-rotation", "--sensor-translation"});
   if (verb == "solve")
     options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
                     "--loss", "--cheirality", "--points", "--fix", "--refine", "--solver",

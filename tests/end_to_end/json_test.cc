@@ -58,8 +58,16 @@ bool is_list(const json& value) { return has_keys(value, {"count", "first"}); }
 
 // Exactly an object of errors, or with other keys beside.
 bool is_errors(const json& value, bool and_more = false) {
-  const std::set<std::string> keys = {"aligned",           "scale",        "rotation_error_rad",
-                                      "translation_error", "center_error", "point_error"};
+  const std::set<std::string> keys = {"aligned",
+                                      "scale",
+                                      "rotation_error_rad",
+                                      "translation_error",
+                                      "center_error",
+                                      "point_error",
+                                      "frame_rotation_error_rad",
+                                      "frame_center_error",
+                                      "sensor_rotation_error_rad",
+                                      "sensor_translation_error"};
   if (!and_more && !has_keys(value, keys)) return false;
   for (const std::string& key : keys)
     if (!value.contains(key)) return false;
