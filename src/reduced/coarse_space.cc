@@ -155,7 +155,7 @@ void CoarseSpace::place_rows(const double* adjoints) {
       const int rows = std::min(kRows, part->first + part->count);
       for (int r = part->first; r < rows; ++r)
         for (int k = identity ? r : 0; k < (identity ? r + 1 : 6); ++k) {
-          const double m = identity ? 1 : adjoints[36 * part->sensor + 6 * r + k];
+          const double m = identity ? 1 : adjoints[48 * part->sensor + 8 * r + k];
           for (int c = 0; c < 8; ++c) to[8 * r + c] += m * Z[8 * k + c];
         }
     }

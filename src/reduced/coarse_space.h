@@ -30,8 +30,8 @@ class CoarseSpace {
   CoarseSpace(const Batches& batches, const Columns& columns, const BlockMap* map,
               Clusters clusters, std::size_t slices, const Kernels& kernels, Threads& threads);
 
-  /// What Z is placed by: kCameraRecord per solved block and, where rows are mapped, 36 doubles per
-  /// sensor.
+  /// What Z is placed by: kCameraRecord per solved block and, where rows are mapped, 48 doubles per
+  /// sensor, rows of the adjoint eight apart.
   struct State {
     const double* cameras;
     const double* adjoints = nullptr;

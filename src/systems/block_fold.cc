@@ -10,12 +10,14 @@
 namespace sheaf {
 namespace {
 
-constexpr int kPose = 6;
+constexpr int kPose = 6, kStride = static_cast<int>(Adjoint::kStride);
 
-/// Rows a.first.. and columns b.first.. of a block, 9 x 9 at most.
+/// Rows and columns of a block, eight apart; the ninth of each beside them.
 struct Product {
   double x[9][9];
 };
+
+bool is_pose(const BlockPart& part) { return part.first == 0 && part.count == kPose; }
 
 /// M_a^T B M_b; entry(r, k) reads B.
 template <class Entry>
@@ -26,11 +28,11 @@ void multiply_parts(const BlockPart& a, const BlockPart& b, const Adjoints& adjo
   for (int r = 0; r < rows; ++r)
     for (int k = 0; k < columns; ++k) B[r][k] = entry(a.first + r, b.first + k);
   if (b.sensor != BlockPart::kIdentity) {
-    const double* M = adjoints[static_cast<std::size_t>(b.sensor)].data();
+    const Adjoint& M = adjoints[static_cast<std::size_t>(b.sensor)];
     for (int r = 0; r < rows; ++r) {
       double row[kPose] = {};
-      for (int q = 0; q < kPose; ++q)
-        for (int k = 0; k < kPose; ++k) row[k] += B[r][q] * M[kPose * q + k];
+      for (std::size_t q = 0; q < kPose; ++q)
+        for (std::size_t k = 0; k < kPose; ++k) row[k] += B[r][q] * M(q, k);
       std::copy_n(row, kPose, B[r]);
     }
   }
@@ -38,11 +40,11 @@ void multiply_parts(const BlockPart& a, const BlockPart& b, const Adjoints& adjo
     for (int r = 0; r < rows; ++r) std::copy_n(B[r], columns, out.x[r]);
     return;
   }
-  const double* M = adjoints[static_cast<std::size_t>(a.sensor)].data();
-  for (int r = 0; r < kPose; ++r) {
+  const Adjoint& M = adjoints[static_cast<std::size_t>(a.sensor)];
+  for (std::size_t r = 0; r < kPose; ++r) {
     std::fill_n(out.x[r], columns, 0.0);
-    for (int q = 0; q < kPose; ++q)
-      for (int k = 0; k < columns; ++k) out.x[r][k] += M[kPose * q + r] * B[q][k];
+    for (std::size_t q = 0; q < kPose; ++q)
+      for (int k = 0; k < columns; ++k) out.x[r][k] += M(q, r) * B[q][k];
   }
 }
 
@@ -65,10 +67,11 @@ void add_vectors(const BlockPart& part, const Adjoints& adjoints, const double* 
       right = from[diagonal_layout::right_side(at)];
       square = square_of(at);
     } else {
-      const double* M = adjoints[static_cast<std::size_t>(part.sensor)].data();
+      const Adjoint& M = adjoints[static_cast<std::size_t>(part.sensor)];
       for (int q = 0; q < kPose; ++q) {
-        right += M[kPose * q + r] * from[diagonal_layout::right_side(q)];
-        square += M[kPose * q + r] * M[kPose * q + r] * square_of(q);
+        const double m = M(static_cast<std::size_t>(q), static_cast<std::size_t>(r));
+        right += m * from[diagonal_layout::right_side(q)];
+        square += m * m * square_of(q);
       }
     }
     to[diagonal_layout::right_side(at)] += right;
@@ -83,13 +86,12 @@ Adjoints adjoints_of(const CameraState& cameras) {
   for (const RigidMotion<double>& sensor : cameras.sensors) {
     const Matrix3<double> R = matrix_from_quaternion(sensor.rotation);
     const auto& t = sensor.translation;
-    std::array<double, 36>& A = out.emplace_back();
-    A.fill(0);
+    auto& A = out.emplace_back().at;
     for (std::size_t r = 0; r < 3; ++r)
       for (std::size_t k = 0; k < 3; ++k) {
-        A[6 * r + k] = A[6 * (3 + r) + 3 + k] = R[3 * r + k];
+        A[8 * r + k] = A[8 * (3 + r) + 3 + k] = R[3 * r + k];
         const std::size_t s = (r + 1) % 3, u = (r + 2) % 3;
-        A[6 * r + 3 + k] = t[s] * R[3 * u + k] - t[u] * R[3 * s + k];
+        A[8 * r + 3 + k] = t[s] * R[3 * u + k] - t[u] * R[3 * s + k];
       }
   }
   return out;
@@ -105,9 +107,9 @@ void to_rows(const BlockMap& map, const Adjoints& adjoints, const double* solved
         for (int k = part->first; k < part->first + part->count; ++k) to[k] += x[k];
         continue;
       }
-      const double* M = adjoints[static_cast<std::size_t>(part->sensor)].data();
-      for (int r = 0; r < kPose; ++r)
-        for (int k = 0; k < kPose; ++k) to[r] += M[kPose * r + k] * x[k];
+      const Adjoint& M = adjoints[static_cast<std::size_t>(part->sensor)];
+      for (std::size_t r = 0; r < kPose; ++r)
+        for (std::size_t k = 0; k < kPose; ++k) to[r] += M(r, k) * x[k];
     }
 }
 
@@ -121,15 +123,18 @@ void to_solved(const BlockMap& map, const Adjoints& adjoints, const double* rows
         for (int k = part->first; k < part->first + part->count; ++k) to[k] += y[k];
         continue;
       }
-      const double* M = adjoints[static_cast<std::size_t>(part->sensor)].data();
-      for (int r = 0; r < kPose; ++r)
-        for (int k = 0; k < kPose; ++k) to[k] += M[kPose * r + k] * y[r];
+      const Adjoint& M = adjoints[static_cast<std::size_t>(part->sensor)];
+      for (std::size_t r = 0; r < kPose; ++r)
+        for (std::size_t k = 0; k < kPose; ++k) to[k] += M(r, k) * y[r];
     }
 }
 
 BlockFold::BlockFold(const BlockMap& map, const std::vector<Tile>& row_tiles, bool with_tiles,
-                     Threads& threads)
-    : map_(map), threads_(threads), row_tiles_(static_cast<std::uint32_t>(row_tiles.size())) {
+                     const char* simd_name, Threads& threads)
+    : map_(map),
+      products_(pose_products(simd_name)),
+      threads_(threads),
+      row_tiles_(static_cast<std::uint32_t>(row_tiles.size())) {
   if (with_tiles) tiles_ = map.solved_tiles(row_tiles);
   list_pieces(row_tiles, with_tiles);
   tile_sums_.allocate(kTileDoubles * tiles_.size());
@@ -173,30 +178,41 @@ void BlockFold::list_pieces(const std::vector<Tile>& row_tiles, bool with_tiles)
 }
 
 /// A solved tile is what S lacks of it: tiles of rows add to it, diagonal blocks are taken off.
+/// Pieces of poses, nearly all there are, are summed apart: as they are, and those that are turned.
 void BlockFold::fold_tile(std::size_t tile, const Adjoints& adjoints, const double* tiles,
                           const double* diagonal) {
   double* to = &tile_sums_[kTileDoubles * tile];
   std::fill_n(to, kTileDoubles, 0.0);
+  alignas(64) double poses[2][kPoseMatrix] = {};
+  const auto matrix = [&](const BlockPart& part) {
+    const bool identity = part.sensor == BlockPart::kIdentity;
+    return identity ? nullptr : adjoints[static_cast<std::size_t>(part.sensor)].at.data();
+  };
   for (std::uint64_t p = first_piece_[tile]; p < first_piece_[tile + 1]; ++p) {
     const Piece& piece = pieces_[p];
     const BlockPart &a = map_.parts[piece.a], &b = map_.parts[piece.b];
-    const bool is_tile = piece.from < row_tiles_;
+    const bool is_tile = piece.from < row_tiles_, as_is = a.block == tiles_[tile].row;
+    if (is_tile && is_pose(a) && is_pose(b)) {
+      products_.add(matrix(a), tiles + kTileDoubles * piece.from, matrix(b), poses[as_is ? 0 : 1]);
+      continue;
+    }
     Product product;
     if (is_tile) {
       const double* from = tiles + kTileDoubles * piece.from;
-      multiply_parts(
-          a, b, adjoints, [&](int r, int k) { return tile_entry(from, r, k); }, product);
+      multiply_parts(a, b, adjoints, [&](int r, int k) { return tile_entry(from, r, k); }, product);
     } else {
       const double* from = diagonal + kDiagonalDoubles * (piece.from - row_tiles_);
-      multiply_parts(
-          a, b, adjoints, [&](int r, int k) { return -diagonal_entry(from, r, k); }, product);
+      multiply_parts(a, b, adjoints, [&](int r, int k) { return -diagonal_entry(from, r, k); },
+                     product);
     }
-    const bool as_is = a.block == tiles_[tile].row;
     for (int r = 0; r < a.count; ++r)
       for (int k = 0; k < b.count; ++k)
         to[as_is ? tile_layout::at(a.first + r, b.first + k)
                  : tile_layout::at(b.first + k, a.first + r)] += product.x[r][k];
   }
+  for (int r = 0; r < kPose; ++r)
+    for (int k = 0; k < kPose; ++k)
+      to[tile_layout::at(r, k)] += poses[0][kStride * r + k] + poses[1][kStride * k + r];
 }
 
 /// Two parts of one block, in a tile or beside each other in a diagonal block, count both ways.

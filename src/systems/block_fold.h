@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "eliminate/pose_products.h"
 #include "lists/block_map.h"
 #include "platform/buffer.h"
 #include "platform/parallel.h"
@@ -14,7 +15,15 @@
 namespace sheaf {
 
 /// The adjoint of each sensor, 6 x 6, row-major: [R, [t]x R; 0, R] for (rho, phi).
-using Adjoints = std::vector<std::array<double, 36>>;
+/// Rows are eight apart, so that they are as those of tiles.
+struct alignas(64) Adjoint {
+  static constexpr std::size_t kStride = 8;
+  std::array<double, 6 * kStride> at{};
+  double operator()(std::size_t row, std::size_t column) const {
+    return at[kStride * row + column];
+  }
+};
+using Adjoints = std::vector<Adjoint>;
 Adjoints adjoints_of(const CameraState& cameras);
 
 /// kBlockVector doubles for each block of rows from those of the solved blocks, x_row = M x.
@@ -29,7 +38,7 @@ class BlockFold {
   /// row_tiles: of the sums over rows; with_tiles: whether solved tiles are wanted, too. The map
   /// must outlive it.
   BlockFold(const BlockMap& map, const std::vector<Tile>& row_tiles, bool with_tiles,
-            Threads& threads);
+            const char* simd_name, Threads& threads);
 
   /// The solved tiles, in the layout of ReducedSums.
   const std::vector<Tile>& tiles() const { return tiles_; }
@@ -53,6 +62,7 @@ class BlockFold {
                      const double* diagonal);
 
   const BlockMap& map_;
+  const PoseProducts& products_;
   Threads& threads_;
   const std::uint32_t row_tiles_;
   std::vector<Tile> tiles_;

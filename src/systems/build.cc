@@ -237,7 +237,7 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
     if (!terms_.empty())
       rows = std::make_unique<TermRows>(std::move(rows), std::move(terms_), columns, kept);
     rows = std::make_unique<MappedRows>(std::move(rows), arranged_->row_columns, *arranged_->map,
-                                        forms, *threads_);
+                                        forms, kernels.name, *threads_);
     camera_columns.add_kept(arranged_->row_columns, first_kept, kept);
     camera_columns = camera_columns.through(*arranged_->map, problem.rigs);
   }

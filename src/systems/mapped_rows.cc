@@ -78,12 +78,12 @@ class MappedRows::Dogleg : public DoglegSource {
 };
 
 MappedRows::MappedRows(std::unique_ptr<PointRows> rows, const Columns& columns, const BlockMap& map,
-                       bool forms_tiles, Threads& threads)
+                       bool forms_tiles, const char* simd_name, Threads& threads)
     : rows_(std::move(rows)),
       columns_(columns),
       map_(map),
       threads_(threads),
-      fold_(map, rows_->reduced_chunks().tiles, forms_tiles, threads),
+      fold_(map, rows_->reduced_chunks().tiles, forms_tiles, simd_name, threads),
       solved_(kBlockVector * map.columns.num_images()),
       of_rows_(kBlockVector * map.row_blocks()),
       row_columns_((static_cast<std::size_t>(columns.count) + 7) / 8 * 8) {
@@ -122,7 +122,7 @@ CoarseSpace::State MappedRows::coarse_state() {
   for (std::uint32_t j = 0; j < map_.kept; ++j)
     std::copy_n(held.kept[j].begin(), 3,
                 &records_[kCameraRecord * (map_.first_kept + std::size_t(j))]);
-  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().data(), map_.first_kept};
+  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().at.data(), map_.first_kept};
 }
 
 void MappedRows::step(const Buffer<double>& columns) {

@@ -17,7 +17,7 @@ class MappedRows : public PointRows {
   /// columns: of the rows' own blocks. solved_chunks: `tiles` alone are set, by this. All must
   /// outlive it.
   MappedRows(std::unique_ptr<PointRows> rows, const Columns& columns, const BlockMap& map,
-             bool forms_tiles, Threads& threads);
+             bool forms_tiles, const char* simd_name, Threads& threads);
 
   const Batches& batches() const override { return rows_->batches(); }
   const Chunks& chunks() const override { return rows_->chunks(); }

@@ -173,7 +173,7 @@ struct RigPlaces {
         }
         const std::uint32_t f = p.rigs.image_frame[i], s = p.rigs.image_sensor[i];
         for (int c = 0; c < 6 && frames[f] >= 0; ++c)
-          row.emplace_back(frames[f] + c, adjoints[s][6 * k + c]);
+          row.emplace_back(frames[f] + c, adjoints[s](k, c));
         if (sensors[s] >= 0) row.emplace_back(sensors[s] + k, 1.0);
       }
     for (const auto* places : {&of_images.lens, &of_images.point})
