@@ -150,6 +150,19 @@ Json scene_options_json(const SceneOptions& o) {
           {"seed", o.seed}};
 }
 
+Json part_json(double before, double after) {
+  return {{"before", number(before)}, {"after", number(after)}};
+}
+
+Json cost_parts_json(const Summary& s) {
+  const TermCosts &a = s.initial_terms, &b = s.final_terms;
+  return {{"observations", part_json(s.initial_cost - a.total(), s.final_cost - b.total())},
+          {"centres", part_json(a.centres, b.centres)},
+          {"points", part_json(a.points, b.points)},
+          {"distances", part_json(a.distances, b.distances)},
+          {"gaussians", part_json(a.gaussians, b.gaussians)}};
+}
+
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
   return {
       {"version", SHEAF_VERSION},
@@ -163,6 +176,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
       {"memory", {{"forecast_bytes", s.forecast_bytes}, {"peak_bytes", peak_resident_bytes()}}},
       {"initial_cost", number(s.initial_cost)},
       {"final_cost", number(s.final_cost)},
+      {"cost_parts", cost_parts_json(s)},
       {"loss", loss_json(s)},
       {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
       {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},

@@ -159,6 +159,9 @@ struct Evaluation {
 };
 Evaluation evaluate(const Problem& problem);
 
+/// What a problem's terms cost, by straightforward scalar code, likewise independent.
+TermCosts evaluate_terms(const Problem& problem);
+
 /// 64 bits that differ, but for chance, between any two states, lenses or measurements.
 std::uint64_t state_hash(const Problem& problem);
 

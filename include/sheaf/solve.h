@@ -91,8 +91,10 @@ struct Summary {
   double final_cost = 0;          ///< with the last round's
   double initial_plain_cost = 0;  ///< 1/2 sum |r|^2, whatever the loss
   double final_plain_cost = 0;
-  double initial_rms_px = 0;  ///< per observation, of the plain residuals
+  double initial_rms_px = 0;  ///< per observation, of the plain residuals; sigmas take no part
   double final_rms_px = 0;
+  /// What of the costs is the terms'; the rest is the observations'.
+  TermCosts initial_terms, final_terms;
   Termination termination = Termination::no_usable_step;
   std::string words;  ///< the reason for stopping, as a sentence
   std::vector<Iteration> iterations;

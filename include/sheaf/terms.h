@@ -81,4 +81,10 @@ struct Terms {
   }
 };
 
+/// What each kind of terms costs: 1/2 sum rho, in sigmas squared.
+struct TermCosts {
+  double centres = 0, points = 0, distances = 0, gaussians = 0;
+  double total() const { return centres + points + distances + gaussians; }
+};
+
 }  // namespace sheaf

@@ -7,6 +7,8 @@
 #include <set>
 
 #include "geometry/camera_model.h"
+#include "geometry/loss.h"
+#include "geometry/motion_log.h"
 
 namespace sheaf {
 namespace {
@@ -88,6 +90,85 @@ std::optional<std::array<double, 9>> whitening(const Covariance3& C) {
   const double u01 = -r01 / (r00 * r11), u12 = -r12 / (r11 * r22);
   const double u02 = (r01 * r12 / r11 - r02) / (r00 * r22);
   return std::array<double, 9>{1 / r00, u01, u02, 0, 1 / r11, u12, 0, 0, 1 / r22};
+}
+
+namespace {
+
+double half_rho(const TermLoss& loss, double square) {
+  return evaluate_loss({loss.kind, loss.scale}, square).value / 2;
+}
+
+/// e^T C^-1 e.
+double whitened_square(const Covariance3& covariance, const Vector3<double>& e) {
+  const Vector3<double> r = multiply(*whitening(covariance), e);
+  return r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+}
+
+Vector3<double> point_at(const Problem& problem, std::uint32_t point) {
+  const double* X = &problem.points[3 * std::size_t(point)];
+  return {X[0], X[1], X[2]};
+}
+
+double cost_of(const Problem& problem, const CentrePrior& of) {
+  const Pose pose = pose_of(problem, of.image);
+  const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+  Vector3<double> e;
+  for (std::size_t k = 0; k < 3; ++k) {
+    e[k] = -of.position[k];
+    for (std::size_t i = 0; i < 3; ++i) e[k] -= R[3 * i + k] * pose.translation[i];
+  }
+  return half_rho(of.loss, whitened_square(of.covariance, e));
+}
+
+double cost_of(const Problem& problem, const PointPrior& of) {
+  Vector3<double> e = point_at(problem, of.point);
+  for (std::size_t k = 0; k < 3; ++k) e[k] -= of.position[k];
+  return whitened_square(of.covariance, e) / 2;
+}
+
+double cost_of(const Problem& problem, const DistancePrior& of) {
+  const Vector3<double> a = point_at(problem, of.first), b = point_at(problem, of.second);
+  const double r = (std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) - of.distance) / of.sigma;
+  return half_rho(of.loss, r * r);
+}
+
+double cost_of(const Problem& problem, const GaussianPrior& of) {
+  std::vector<double> d;
+  for (const GaussianPrior::Block& block : of.blocks) {
+    const std::vector<double>& s = block.state;
+    if (block.kind == Kind::pose) {
+      const Pose pose = pose_of(problem, block.index);
+      const RigidMotion<double> state{{s[0], s[1], s[2], s[3]}, {s[4], s[5], s[6]}};
+      const auto log = log_of(
+          composed<double>({pose.rotation, pose.translation}, inverse<double>(state)));
+      d.insert(d.end(), log.begin(), log.end());
+      continue;
+    }
+    const Vector3<double> X =
+        block.kind == Kind::point ? point_at(problem, block.index) : Vector3<double>{};
+    for (std::size_t k = 0; k < s.size(); ++k)
+      d.push_back((block.kind == Kind::point ? X[k] : problem.cameras[block.index].parameters[k]) -
+                  s[k]);
+  }
+  double square = 0;
+  for (std::size_t row = 0; row < of.square_root.size() / d.size(); ++row) {
+    double r = 0;
+    for (std::size_t k = 0; k < d.size(); ++k)
+      r += of.square_root[row * d.size() + k] * (of.mean.empty() ? d[k] : d[k] - of.mean[k]);
+    square += r * r;
+  }
+  return half_rho(of.loss, square);
+}
+
+}  // namespace
+
+TermCosts evaluate_terms(const Problem& problem) {
+  TermCosts out;
+  for (const auto& of : problem.terms.centres) out.centres += cost_of(problem, of);
+  for (const auto& of : problem.terms.points) out.points += cost_of(problem, of);
+  for (const auto& of : problem.terms.distances) out.distances += cost_of(problem, of);
+  for (const auto& of : problem.terms.gaussians) out.gaussians += cost_of(problem, of);
+  return out;
 }
 
 std::vector<std::uint32_t> kept_points(const Terms& terms) {

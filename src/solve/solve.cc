@@ -60,6 +60,11 @@ double rms(double cost, std::size_t observations) {
   return observations > 0 ? std::sqrt(2 * cost / static_cast<double>(observations)) : 0;
 }
 
+/// Of a problem with sigmas, whose costs are not of pixels.
+double plain_rms_px(const Problem& problem) {
+  return problem.observation_sigma.empty() ? 0 : evaluate(problem).rms_px;
+}
+
 const char* to_string(PointParametrisation points) {
   switch (points) {
     case PointParametrisation::homogeneous:
@@ -294,6 +299,8 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   place_images(problem);
+  summary.initial_terms = evaluate_terms(problem);
+  const double rms_before_px = plain_rms_px(problem);
   try {
     Attempts attempts(problem, options, *kernels.value(), clock, summary);
     const Result<void> done = attempts.run();
@@ -304,6 +311,11 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
   const std::size_t used = problem.num_observations() - summary.rejected_observations.size();
   summary.initial_rms_px = rms(summary.initial_plain_cost, used);
   summary.final_rms_px = rms(summary.final_plain_cost, used);
+  summary.final_terms = evaluate_terms(problem);
+  if (!problem.observation_sigma.empty()) {
+    summary.initial_rms_px = rms_before_px;
+    summary.final_rms_px = plain_rms_px(problem);
+  }
   return summary;
 }
 
