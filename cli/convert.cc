@@ -11,6 +11,7 @@
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -21,6 +22,7 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
+  RigsArguments rigs;
   std::string in, out, format;
   CleanOptions clean;
 };
@@ -64,6 +66,7 @@ int run(const Arguments& arguments) {
   check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);
+  const Json laid = lay_rigs(arguments.rigs, input);
   const std::string counts = counts_text(input.problem);
   CleanRecord cleaned;
   if (arguments.clean.any()) cleaned = clean(input.problem, arguments.clean);
@@ -82,6 +85,7 @@ int run(const Arguments& arguments) {
   const Json document = {
       {"version", SHEAF_VERSION},
       {"input", before},
+      {"rig_configuration", laid},
       {"cleaned", cleaned_json(arguments.clean, cleaned)},
       {"output", {{"path", arguments.out}, {"format", format}, {"bytes", bytes_at(arguments.out)}}},
       {"dropped", lost_in(format, input.problem)},
@@ -149,7 +153,7 @@ Verb convert_verb() {
                                          .help = "write this whatever the name, and say what it "
                                                  "does not hold"})},
                                *a),
-              bound(clean_fields(), a->clean), options_of(a->common)});
+              bound(clean_fields(), a->clean), options_of(a->rigs), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -15,6 +15,7 @@
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
+#include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "timer.h"
@@ -25,6 +26,7 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
+  RigsArguments rigs;
   std::string in, pattern;
 };
 
@@ -88,12 +90,54 @@ std::map<std::string, std::size_t> lenses_of(const Problem& problem) {
   return counts;
 }
 
+std::int64_t images_of_rigs(const Rigs& rigs) {
+  return std::ssize(rigs.image_frame) -
+         std::count(rigs.image_frame.begin(), rigs.image_frame.end(), Rigs::kNone);
+}
+
+std::vector<std::uint32_t> stale_poses(const Problem& problem) {
+  return problem.metadata ? problem.metadata->stale_poses : std::vector<std::uint32_t>();
+}
+
 // "1 SIMPLE_RADIAL, 2 OPENCV"
 std::string lenses_text(const Problem& problem) {
   std::string out;
   for (const auto& [model, count] : lenses_of(problem))
     out += fmt::format("{}{} {}", out.empty() ? "" : ", ", count, model);
   return out;
+}
+
+// "2 rigs of 5 sensors took 12 images in 4 frames"; nothing for a problem without.
+void print_rigs(const Problem& problem) {
+  const Rigs& rigs = problem.rigs;
+  if (!rigs.empty())
+    fmt::print("rigs        {} of {} sensors, {} frames of {} images\n", rigs.count,
+               rigs.num_sensors(), rigs.num_frames(), images_of_rigs(rigs));
+  const std::vector<std::uint32_t> stale = stale_poses(problem);
+  if (stale.empty()) return;
+  constexpr std::size_t kShown = 8;
+  const std::size_t shown = std::min(stale.size(), kShown);
+  fmt::print(
+      "stale       {} images have other poses in the file of images than frames and rigs give, "
+      "which hold: images {}{}\n",
+      stale.size(),
+      fmt::join(stale.begin(), stale.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+      stale.size() > shown ? " ..." : "");
+}
+
+Json rigs_json(const Rigs& rigs) {
+  return {{"count", rigs.count},
+          {"sensors", rigs.num_sensors()},
+          {"frames", rigs.num_frames()},
+          {"images", images_of_rigs(rigs)}};
+}
+
+Json stale_json(const Problem& problem) {
+  constexpr std::size_t kMostListed = 1000;
+  std::vector<std::uint32_t> stale = stale_poses(problem);
+  const std::size_t count = stale.size();
+  stale.resize(std::min(count, kMostListed));
+  return {{"count", count}, {"first", stale}};
 }
 
 void print(const std::string& path, const InputFile& input, const Statistics& statistics,
@@ -106,9 +150,7 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
              input.read_s);
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   fmt::print("lenses      {}\n", lenses_text(input.problem));
-  if (const RigCounts rigs = rig_counts(input.problem); rigs.rigid_frames > 0)
-    fmt::print("rigs        {} with {} sensors, {} frames, {} of {} images\n", rigs.rigs,
-               rigs.sensors, rigs.frames, rigs.images, input.problem.num_images());
+  print_rigs(input.problem);
   fmt::print("cost        {:.9e}\n", evaluation.cost);
   fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
              evaluation.rms_px, statistics.mean_error_px);
@@ -130,7 +172,9 @@ int run(const Arguments& arguments) {
   const Timer total;
   const std::string& json = arguments.common.json;
   check_outputs({{"--pattern", arguments.pattern}, {"--json", json}});
-  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const Json read = input_json(arguments.in, input);
+  const Json laid = lay_rigs(arguments.rigs, input);
   const Statistics statistics = statistics_of(input.problem);
   const Evaluation evaluation = evaluate(input.problem);
   print(arguments.in, input, statistics, evaluation);
@@ -138,16 +182,14 @@ int run(const Arguments& arguments) {
   if (!arguments.pattern.empty())
     pattern = write_pattern(input.problem, arguments.in, arguments.pattern);
   if (json.empty()) return 0;
-  Json document = {{"version", SHEAF_VERSION}, {"input", input_json(arguments.in, input)}};
+  Json document = {{"version", SHEAF_VERSION}, {"input", read}};
   document.update(statistics_json(statistics));
   document["lenses"] = Json::array();
   for (const auto& [model, count] : lenses_of(input.problem))
     document["lenses"].push_back({{"model", model}, {"count", count}});
-  const RigCounts rigs = rig_counts(input.problem);
-  document["rigs"] = {{"count", rigs.rigs},
-                      {"sensors", rigs.sensors},
-                      {"frames", rigs.frames},
-                      {"images", rigs.images}};
+  document["rigs"] = rigs_json(input.problem.rigs);
+  document["rig_configuration"] = laid;
+  document["stale_poses"] = stale_json(input.problem);
   document["cost"] = number(evaluation.cost);
   document["rms_px"] = number(evaluation.rms_px);
   document["mean_error_px"] = number(statistics.mean_error_px);
@@ -176,7 +218,7 @@ Verb info_verb() {
                                   .help = "also draw the network of images and the patterns of "
                                           "Jacobian, Hessian and reduced camera matrix, as PNG"})},
                         *a),
-       options_of(a->common)});
+       options_of(a->rigs), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -168,6 +168,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
       {"version", SHEAF_VERSION},
       {"input", record.input},
       {"options", record.options},
+      {"rig_configuration", record.rig_configuration},
       {"solver", {{"name", s.solver}, {"reason", s.solver_reason}, {"changes", changes_json(s)}}},
       {"points", {{"name", s.points}, {"reason", s.points_reason}}},
       {"precision", s.precision},

@@ -38,6 +38,7 @@ Json loss_json(const Summary& summary);
 /// What the JSON of a solve is made of.
 struct SolveRecord {
   Json input, options;
+  Json rig_configuration{};  ///< null without --rigs
   Evaluation before, after;  ///< by independent code
   bool agrees = true;        ///< the solver's final cost with it
   double read_s = 0, cpu_s = 0, write_s = 0, total_s = 0;

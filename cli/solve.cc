@@ -16,6 +16,7 @@
 #include "options/solve_options.h"
 #include "outputs.h"
 #include "progress.h"
+#include "rigs_option.h"
 #include "scene/subset.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -28,6 +29,7 @@ namespace {
 struct Arguments {
   CommonOptions common;
   SolveArguments solve;
+  RigsArguments rigs;
   std::string in, out, ply;
 };
 
@@ -98,10 +100,9 @@ int run(Arguments& arguments) {
   SolveRecord record;
   record.options = options_json(options_of(arguments.solve));
   record.read_s = input.read_s;
-  if (wants_json) {
-    record.input = input_json(arguments.in, input);
-    record.before = evaluate(problem);
-  }
+  if (wants_json) record.input = input_json(arguments.in, input);
+  record.rig_configuration = lay_rigs(arguments.rigs, input);
+  if (wants_json) record.before = evaluate(problem);
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
 
   Progress progress(arguments.common.quiet);
@@ -166,7 +167,7 @@ Verb solve_verb() {
                                   .short_name = "o"}),
                          F::text(&Arguments::ply, ply_of_two_states())},
                         *a),
-       own(options_of(a->solve)), options_of(a->common)});
+       own(options_of(a->solve)), options_of(a->rigs), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -126,6 +126,17 @@ std::uint64_t moving_poses(const Problem& problem) {
   return poses;
 }
 
+/// Poses that a file states twice, and differently.
+void check_stale_poses(const Problem& problem, FindingList& list) {
+  if (problem.metadata == nullptr) return;
+  const auto& stale = problem.metadata->stale_poses;
+  list.add("stale-poses", false, "images", Numbers(stale.begin(), stale.end()),
+           plural(stale.size(), "image has", "images have") +
+               " another pose in the file of images than its frame and its rig's sensor give, "
+               "which hold, as in COLMAP; what reads the images alone sees old poses: write the "
+               "model anew (convert to the other form, or solve)");
+}
+
 /// More unknowns than measurements, whatever their arrangement; the 7 of the gauge are free.
 void check_rank(const Problem& problem, FindingList& list) {
   std::uint64_t lenses = 0;
@@ -230,6 +241,7 @@ std::vector<Finding> check(const Problem& problem) {
   check_rigs(problem, list);
   check_points(problem, list);
   check_rank(problem, list);
+  check_stale_poses(problem, list);
   check_duplicates(problem, list);
   const MeasuredReaches measured = measured_reaches(problem);
   Named named(problem.num_observations(), false);

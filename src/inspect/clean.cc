@@ -10,6 +10,7 @@
 #include "geometry/rotation.h"
 #include "scene/camera_plane.h"
 #include "scene/point_errors.h"
+#include "scene/rigs.h"
 #include "scene/subset.h"
 
 namespace sheaf {
@@ -19,7 +20,8 @@ constexpr std::size_t kMostRays = 64;
 
 std::vector<Vector3<double>> centres_of(const Problem& problem) {
   std::vector<Vector3<double>> centres;
-  for (const Pose& pose : problem.poses) {
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const Pose pose = pose_of(problem, j);
     const auto& [w, x, y, z] = pose.rotation;
     const auto& t = pose.translation;
     centres.push_back(multiply(matrix_from_quaternion<double>({w, -x, -y, -z}),

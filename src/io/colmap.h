@@ -33,12 +33,10 @@ Result<ColmapFiles> load_colmap(const std::filesystem::path& folder);
 /// (ids that occur twice or nowhere, tracks and features that disagree).
 Result<Problem> parse_colmap(const ColmapFiles& files);
 
-/// A sentence where frames of rigs have several images, which are solved one by one.
-std::vector<std::string> notes_on(const ColmapFiles& files);
-
 /// What a folder will hold; the files that nothing changed are, byte for byte, those that were
-/// read, where the form (binary or text) is the same. Errors: usage, for a problem that the form
-/// cannot hold.
+/// read, where the form (binary or text) is the same. A problem with rigs has rigs and frames, each
+/// image in one; those of a model whose frames are all trivial follow their images. Errors: usage,
+/// for a problem that the form cannot hold.
 Result<ColmapFiles> format_colmap(const Problem& problem, bool text);
 
 /// Writes them, making the folder where there is none. Refuses a folder with files of a model that

@@ -160,11 +160,32 @@ std::optional<ColmapDraft::Unmatched> ColmapDraft::unmatched() const {
   return {};
 }
 
-Problem ColmapDraft::take(std::shared_ptr<const SourceFiles> source) {
+void ColmapDraft::place_image(std::uint32_t image, const Pose& pose, bool stale) {
+  Pose& placed = problem_.poses[image];
+  StatedPose& stated = stated_poses_[metadata_.image_ids[image]];
+  std::copy_n(&metadata_.stated_rotations[4 * std::size_t(image)], 4, stated.numbers.begin());
+  std::copy_n(placed.translation.begin(), 3, stated.numbers.begin() + 4);
+  stated.placed = pose;
+  stated.stale = stale;
+  placed = pose;
+  if (stale) metadata_.stale_poses.push_back(image);
+}
+
+void ColmapDraft::set_rigs(Rigs rigs, std::vector<std::uint32_t> rig_ids,
+                           std::vector<std::uint32_t> frame_ids,
+                           std::vector<std::uint32_t> sensor_ids) {
+  problem_.rigs = std::move(rigs);
+  metadata_.rig_ids = std::move(rig_ids);
+  metadata_.frame_ids = std::move(frame_ids);
+  metadata_.sensor_ids = std::move(sensor_ids);
+}
+
+Problem ColmapDraft::take(SourceFiles source) {
   metadata_.feature_begin.push_back(feature_point_.size());
   if (!rotations_restated_) metadata_.stated_rotations.clear();
   metadata_.state_hash = state_hash(problem_);
-  metadata_.source = std::move(source);
+  source.stated_poses = std::move(stated_poses_);
+  metadata_.source = std::make_shared<const SourceFiles>(std::move(source));
   problem_.metadata = std::make_shared<const SceneMetadata>(std::move(metadata_));
   return std::move(problem_);
 }

@@ -11,6 +11,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "io/source_files.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -57,10 +58,17 @@ class ColmapDraft {
   std::optional<Unmatched> unmatched() const;
 
   std::size_t num_images() const { return problem_.num_images(); }
+  const Problem& problem() const { return problem_; }
   const SceneMetadata& metadata() const { return metadata_; }
 
+  /// An image has another pose than the one it was added with; `stale`: by more than rounding.
+  void place_image(std::uint32_t image, const Pose& pose, bool stale);
+  /// Of all images; with the ids of rigs, frames and sensors.
+  void set_rigs(Rigs rigs, std::vector<std::uint32_t> rig_ids, std::vector<std::uint32_t> frame_ids,
+                std::vector<std::uint32_t> sensor_ids);
+
   /// The problem, with its metadata and what only the format can hold.
-  Problem take(std::shared_ptr<const SourceFiles> source);
+  Problem take(SourceFiles source);
 
  private:
   Problem problem_;
@@ -69,6 +77,7 @@ class ColmapDraft {
   UniqueIds point_ids_;
   std::vector<std::uint64_t> feature_point_;  ///< point id, kNoPoint, or kMatched
   std::vector<std::uint64_t> places_;
+  std::unordered_map<std::uint32_t, StatedPose> stated_poses_;
   bool rotations_restated_ = false;
 };
 

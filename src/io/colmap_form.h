@@ -20,10 +20,12 @@ struct ColmapForm {
   std::vector<std::array<std::uint8_t, 3>> colours;
   std::vector<double> errors_px;
   FeatureTable features;
-
-  std::array<double, 4> rotation(std::size_t image) const;  ///< as stated, where it still is
+  /// qw qx qy qz tx ty tz of each image: as stated, where it has not moved since.
+  std::vector<std::array<double, 7>> poses;
 };
-ColmapForm colmap_form(const Problem& problem);
+
+/// `format` is that it will have ("colmap" or "colmap-text").
+ColmapForm colmap_form(const Problem& problem, const std::string& format);
 
 std::string cameras_binary(const ColmapForm& form);
 std::string images_binary(const ColmapForm& form);

@@ -1,10 +1,8 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <memory>
-#include <unordered_set>
-
 #include "io/byte_source.h"
 #include "io/colmap_parts.h"
+#include "io/colmap_rigs.h"
 
 namespace sheaf {
 namespace {
@@ -13,7 +11,7 @@ namespace fs = std::filesystem;
 
 Error unreadable(const std::string& message) { return Error(ErrorCode::unreadable_input, message); }
 
-std::optional<Error> load(const fs::path& path, std::string& bytes) {
+std::optional<Error> load(const fs::path& path, std::string& bytes, bool may_be_empty = false) {
   Result<RawBytes> raw = RawBytes::open(path);
   if (!raw.ok()) return raw.error();
   if (!raw.value().size()) return unreadable(path.string() + ": found no regular file");
@@ -21,28 +19,13 @@ std::optional<Error> load(const fs::path& path, std::string& bytes) {
   const Result<std::size_t> n = raw.value().read(bytes.data(), bytes.size());
   if (!n.ok()) return n.error();
   bytes.resize(n.value());
-  if (!bytes.empty()) return {};
+  if (!bytes.empty() || may_be_empty) return {};
   return unreadable(path.string() + ": found an empty file, expected a part of a COLMAP model");
 }
 
 bool is_there(const fs::path& path) {
   std::error_code ignored;
   return fs::exists(path, ignored);
-}
-
-/// Every frame's images are those of the model, and every image is in a frame.
-std::optional<Error> check_frames(const ColmapFiles& files, const ColmapRigs& rigs,
-                                  const SceneMetadata& metadata) {
-  if (files.frames.empty()) return {};
-  const std::unordered_set<std::uint64_t> ids(metadata.image_ids.begin(), metadata.image_ids.end());
-  std::unordered_set<std::uint64_t> framed;
-  for (const RigFrame& frame : rigs.frames) framed.insert(frame.images.begin(), frame.images.end());
-  for (const std::uint64_t id : ids)
-    if (!framed.contains(id))
-      return unreadable(files.name("frames") + ": found no frame with image id " +
-                        std::to_string(id) + ", expected each image of " + files.name("images") +
-                        " in one");
-  return {};
 }
 
 std::optional<Error> check_features(const ColmapFiles& files, const ColmapDraft& draft) {
@@ -75,13 +58,13 @@ Result<ColmapFiles> load_colmap(const fs::path& folder) {
                                     {"images", &files.images},
                                     {"points3D", &files.points}})
     if (auto e = load(files.name(stem), *bytes)) return *e;
+  const bool rigs = is_there(files.name("rigs")), frames = is_there(files.name("frames"));
+  if (rigs != frames)
+    return unreadable(files.name(rigs ? "rigs" : "frames") + ": found without " +
+                      files.name(rigs ? "frames" : "rigs") + ", expected both or neither");
   for (const auto& [stem, bytes] : {std::pair{"rigs", &files.rigs}, {"frames", &files.frames}})
-    if (is_there(files.name(stem)))
-      if (auto e = load(files.name(stem), *bytes)) return *e;
-  if (files.rigs.empty() != files.frames.empty())
-    return unreadable(files.name(files.rigs.empty() ? "frames" : "rigs") + ": found without " +
-                      files.name(files.rigs.empty() ? "rigs" : "frames") +
-                      ", expected both or neither");
+    if (rigs)
+      if (auto e = load(files.name(stem), *bytes, files.text)) return *e;
   for (const std::string* part :
        {&files.cameras, &files.images, &files.points, &files.rigs, &files.frames})
     files.bytes += part->size();
@@ -99,7 +82,7 @@ Result<Problem> parse_colmap(const ColmapFiles& files) {
   if (auto e = check_features(files, draft)) return *e;
   const Result<ColmapRigs> rigs = parse_rigs(files);
   if (!rigs.ok()) return rigs.error();
-  if (auto e = check_frames(files, rigs.value(), draft.metadata())) return *e;
+  if (auto e = place_rigs(files, rigs.value(), draft)) return *e;
   SourceFiles source;
   source.format = files.text ? "colmap-text" : "colmap";
   source.rigs = files.rigs;
@@ -109,7 +92,7 @@ Result<Problem> parse_colmap(const ColmapFiles& files) {
     source.images = files.images;
     source.points = files.points;
   }
-  return draft.take(std::make_shared<const SourceFiles>(std::move(source)));
+  return draft.take(std::move(source));
 }
 
 }  // namespace sheaf

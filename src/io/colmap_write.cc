@@ -4,9 +4,11 @@
 #include <numeric>
 
 #include "io/colmap_form.h"
+#include "io/colmap_rigs.h"
 #include "io/output_file.h"
 #include "scene/camera_frame.h"
 #include "scene/point_errors.h"
+#include "scene/rigs.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {
@@ -31,6 +33,7 @@ bool writable_in_text(const std::string& name) {
          (name.empty() || (!blank(name.front()) && !blank(name.back())));
 }
 
+/// The text of what was read, line by line; anew without a source.
 ColmapFiles text_files(const ColmapForm& form, const SourceFiles* source) {
   ColmapFiles files;
   files.text = true;
@@ -45,37 +48,62 @@ ColmapFiles text_files(const ColmapForm& form, const SourceFiles* source) {
   were.cameras = source->cameras;
   were.images = source->images;
   were.points = source->points;
+  were.rigs = source->rigs;
+  were.frames = source->frames;
   const Result<Problem> before = parse_colmap(were);
   if (!before.ok()) return text_files(form, nullptr);
-  const ColmapForm before_form = colmap_form(before.value());
+  const ColmapForm before_form = colmap_form(before.value(), "colmap-text");
   files.cameras = cameras_text(form, source->cameras, &before_form);
   files.images = images_text(form, source->images, &before_form);
   files.points = points_text(form, source->points, &before_form);
   return files;
 }
 
-/// Kept where the form is the same and no pose of a rig would be wrong.
-void add_rigs(const Problem& problem, const SourceFiles& source, bool unchanged,
-              ColmapFiles& files) {
-  if (source.frames.empty() || source.format != (files.text ? "colmap-text" : "colmap")) return;
-  ColmapFiles rigs;
-  rigs.text = files.text;
-  rigs.rigs = source.rigs;
-  rigs.frames = source.frames;
-  const auto frames = unchanged ? std::optional(source.frames) : frames_with_poses(rigs, problem);
-  if (!frames) return;
-  files.rigs = source.rigs;
-  files.frames = *frames;
+Result<void> add_rigs(const ColmapForm& form, const SourceFiles* source, ColmapFiles& files) {
+  const ColmapRigs before = source ? parse_rigs(*source) : ColmapRigs();
+  const bool same_form = source && source->format == (files.text ? "colmap-text" : "colmap");
+  const Result<ColmapRigs> rigs = rigs_of(form, before);
+  if (!rigs.ok()) return rigs.error();
+  if (rigs.value().empty()) {
+    // Files without a record are kept as they stood.
+    if (!same_form || !before.empty() || !form.problem->rigs.empty()) return {};
+    files.rigs = source->rigs;
+    files.frames = source->frames;
+    return {};
+  }
+  if (!files.text) {
+    files.rigs = rigs_binary(rigs.value());
+    files.frames = frames_binary(rigs.value());
+    return {};
+  }
+  files.rigs = rigs_text(rigs.value(), same_form ? source->rigs : "", before);
+  files.frames = frames_text(rigs.value(), same_form ? source->frames : "", before);
+  return {};
+}
+
+/// Where an image's pose is what frame and sensor gave when they were read, it is what the file
+/// stated beside them; a stale one only in a model that comes back as it was.
+std::array<double, 7> stated_pose(const Problem& problem, std::size_t image, std::uint32_t id,
+                                  bool as_it_was) {
+  const Pose pose = pose_of(problem, image);
+  const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
+  if (source != nullptr) {
+    const auto stated = source->stated_poses.find(id);
+    if (stated != source->stated_poses.end() && same_bits(stated->second.placed, pose) &&
+        (as_it_was || !stated->second.stale))
+      return stated->second.numbers;
+  }
+  const auto& t = pose.translation;
+  std::array<double, 4> q = pose.rotation;
+  if (same_bits(problem.poses[image], pose))
+    if (const double* numbers = stated_numbers(problem, image, 4))
+      std::copy_n(numbers, 4, q.begin());
+  return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
 }
 
 }  // namespace
 
-std::array<double, 4> ColmapForm::rotation(std::size_t image) const {
-  if (const double* q = stated_numbers(*problem, image, 4)) return {q[0], q[1], q[2], q[3]};
-  return problem->poses[image].rotation;
-}
-
-ColmapForm colmap_form(const Problem& problem) {
+ColmapForm colmap_form(const Problem& problem, const std::string& format) {
   static const SceneMetadata kNone;
   const SceneMetadata& metadata = problem.metadata ? *problem.metadata : kNone;
   ColmapForm form;
@@ -93,13 +121,16 @@ ColmapForm colmap_form(const Problem& problem) {
   form.features = feature_table(problem, form.point_ids);
   form.errors_px = form.unchanged && !metadata.point_errors_px.empty() ? metadata.point_errors_px
                                                                        : mean_point_errors(problem);
+  const bool as_it_was = form.unchanged && metadata.source && metadata.source->format == format;
+  for (std::size_t j = 0; j < problem.num_images(); ++j)
+    form.poses.push_back(stated_pose(problem, j, form.image_ids[j], as_it_was));
   return form;
 }
 
 Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
   Problem turned;
   const Problem* problem = without_bal_cameras(given, turned);
-  const ColmapForm form = colmap_form(*problem);
+  const ColmapForm form = colmap_form(*problem, text ? "colmap-text" : "colmap");
   for (const std::string& name : form.names)
     if (text && !writable_in_text(name))
       return Error(ErrorCode::usage, "the image name '" + name +
@@ -114,7 +145,7 @@ Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
     files.images = images_binary(form);
     files.points = points_binary(form);
   }
-  if (source) add_rigs(*problem, *source, form.unchanged, files);
+  if (Result<void> done = add_rigs(form, source, files); !done.ok()) return done.error();
   return files;
 }
 

@@ -37,8 +37,7 @@ std::string images_binary(const ColmapForm& form) {
   put(out, std::uint64_t{form.problem->num_images()});
   for (std::size_t j = 0; j < form.problem->num_images(); ++j) {
     put(out, form.image_ids[j]);
-    for (const double q : form.rotation(j)) put(out, q);
-    for (const double t : form.problem->poses[j].translation) put(out, t);
+    for (const double x : form.poses[j]) put(out, x);
     put(out, form.camera_ids[form.problem->image_camera[j]]);
     out.append(form.names[j]) += '\0';
     put(out, std::uint64_t{features.begin[j + 1] - features.begin[j]});

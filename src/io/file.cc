@@ -15,6 +15,8 @@
 #include "io/ply.h"
 #include "io/sha256.h"
 #include "scene/camera_frame.h"
+#include "scene/rigs.h"
+#include "scene/stated_rotation.h"
 #include "sheaf/io.h"
 
 namespace sheaf {
@@ -96,7 +98,6 @@ Result<InputFile> read_folder(const fs::path& path, bool hash) {
   file.format = files.value().text ? "colmap-text" : "colmap";
   file.compression = to_string(Compression::none);
   file.bytes = files.value().bytes;
-  file.notes = notes_on(files.value());
   file.read_s = seconds_since(start);
   if (!hash) return file;
   Sha256 of_all;
@@ -160,6 +161,17 @@ Result<void> write_ply_file(const Problem& problem, const fs::path& path) {
   return write_ply(problem, out.value());
 }
 
+/// The problem with the poses that frames and sensors give: itself, or a copy in `moved`.
+const Problem& placed(const Problem& problem, Problem& moved) {
+  for (std::size_t i = 0; i < problem.num_images(); ++i) {
+    if (!in_rig(problem.rigs, i) || same_bits(pose_of(problem, i), problem.poses[i])) continue;
+    moved = problem;
+    place_images(moved);
+    return moved;
+  }
+  return problem;
+}
+
 }  // namespace
 
 Result<InputFile> read_file(const fs::path& path, const ReadOptions& options) {
@@ -196,8 +208,10 @@ std::string write_format(const Problem& problem, const fs::path& path) {
   return "bal";
 }
 
-Result<void> write(const Problem& problem, const fs::path& path, const WriteOptions& options) {
-  if (Result<void> valid = validate(problem); !valid.ok()) return valid;
+Result<void> write(const Problem& given, const fs::path& path, const WriteOptions& options) {
+  if (Result<void> valid = validate(given); !valid.ok()) return valid;
+  Problem moved;
+  const Problem& problem = placed(given, moved);
   const std::string format = options.format.empty() ? write_format(problem, path) : options.format;
   try {
     if (format == "colmap" || format == "colmap-text")

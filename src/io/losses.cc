@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "io/colmap_parts.h"
+#include "io/colmap_rigs.h"
 #include "io/source_files.h"
 #include "scene/camera_frame.h"
 #include "sheaf/io.h"
@@ -34,24 +34,35 @@ void add_lens_losses(const Problem& problem, Sentences& out) {
     out.push_back("measurements count from the principal point, which is not written itself");
 }
 
-void add_rig_losses(const std::string& format, const Problem& problem, Sentences& out) {
+/// Images that no rig took, of a problem in which some were.
+std::size_t images_of_no_rig(const Rigs& rigs) {
+  return static_cast<std::size_t>(
+      std::count(rigs.image_frame.begin(), rigs.image_frame.end(), Rigs::kNone));
+}
+
+void add_rig_losses(bool colmap, const Problem& problem, Sentences& out) {
   const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
-  if (source == nullptr || source->frames.empty()) return;
-  if (source->format != format) {
-    out.push_back(format.starts_with("colmap")
-                      ? "rigs and frames are kept only in the form they were read in (" +
-                            std::string(source->format == "colmap" ? "binary" : "text") + ")"
-                      : "rigs and frames are not written");
+  const ColmapRigs had = source ? parse_rigs(*source) : ColmapRigs();
+  if (!colmap) {
+    if (!had.empty() || !problem.rigs.empty()) out.push_back("rigs and frames are not written");
     return;
   }
-  ColmapFiles files;
-  files.text = format == "colmap-text";
-  files.rigs = source->rigs;
-  files.frames = source->frames;
-  if (state_hash(problem) != problem.metadata->state_hash && !frames_with_poses(files, problem))
-    out.push_back(
-        "rigs and frames are not written: images of one frame moved by themselves, so that no pose "
-        "of their rig is right for all");
+  if (problem.rigs.empty() && !are_trivial(had))
+    out.push_back("rigs and frames are not written: the problem has none any more");
+  if (const std::size_t count = images_of_no_rig(problem.rigs); count > 0)
+    out.push_back(std::to_string(count) +
+                  " images of no rig are written as frames of their own, as COLMAP wants each "
+                  "image in a frame: of the rig that has their camera, or of one for each camera");
+}
+
+void add_term_losses(const Problem& problem, Sentences& out) {
+  if (!problem.observation_sigma.empty()) out.push_back("sigmas of observations are not written");
+  const Terms& terms = problem.terms;
+  const std::size_t priors =
+      terms.centres.size() + terms.points.size() + terms.distances.size() + terms.gaussians.size();
+  if (priors > 0)
+    out.push_back(std::to_string(priors) +
+                  " priors (of centres, points, distances and Gaussians) are not written");
 }
 
 }  // namespace
@@ -60,7 +71,8 @@ Sentences lost_in(const std::string& format, const Problem& problem) {
   Sentences out;
   const SceneMetadata* m = problem.metadata.get();
   const bool colmap = format.starts_with("colmap");
-  add_rig_losses(format, problem, out);
+  add_rig_losses(colmap, problem, out);
+  add_term_losses(problem, out);
   if (colmap && m && m->source && m->source->listed_images > problem.num_images())
     out.push_back("images that were never placed are not written");
   if (colmap) return out;

@@ -169,6 +169,10 @@ Result<void> add_images(const FolderFiles& images, PhotometricFolder& folder) {
     return Error(ErrorCode::unreadable_input,
                  images.folder.string() +
                      ": no point of the model is seen by two images and lies inside one of them");
+  if (!folder.model.rigs.empty())
+    folder.notes.push_back(
+        "images of rigs are refined one by one, not as rigs, so that rigs and frames are not "
+        "written");
   if (const std::size_t out = folder.model.num_points() - folder.model_point.size(); out > 0)
     folder.notes.push_back(std::to_string(out) +
                            " points that fewer than two images see, or none inside its border, "
@@ -179,6 +183,7 @@ Result<void> add_images(const FolderFiles& images, PhotometricFolder& folder) {
 Problem model_with_state(const PhotometricFolder& folder) {
   Problem model = folder.model;
   model.poses = folder.problem.poses;
+  model.rigs = {};  // images moved one by one
   for (std::size_t i = 0; i < folder.model_point.size(); ++i)
     std::copy_n(&folder.problem.points[3 * i], 3,
                 &model.points[3 * std::size_t(folder.model_point[i])]);

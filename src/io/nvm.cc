@@ -211,7 +211,7 @@ Result<std::string> format_nvm(const Problem& given) {
                                   : nullptr;
   // Measurements as they were, where they and the lenses that made them straight still are.
   const bool measured = source && state_hash(given) == metadata->state_hash;
-  const ColmapForm form = colmap_form(problem);
+  const ColmapForm form = colmap_form(problem, "nvm");
   std::string out = "NVM_V3\n\n" + std::to_string(problem.num_images()) + "\n";
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
     if (form.names[j].find_first_of(" \t\r\n") != std::string::npos || form.names[j].empty() ||
@@ -221,7 +221,7 @@ Result<std::string> format_nvm(const Problem& given) {
                        "' has blanks, starts with # or is empty, which NVM cannot state");
     out.append(form.names[j]) += ' ';
     put(out, problem.cameras[problem.image_camera[j]].parameters[0], ' ');
-    for (const double q : form.rotation(j)) put(out, q, ' ');
+    for (std::size_t k = 0; k < 4; ++k) put(out, form.poses[j][k], ' ');
     for (const double c : centre_of(problem, j, source)) put(out, c, ' ');
     put(out, measured ? source->nvm_distortion[j] : 0, ' ');
     out += "0\n";

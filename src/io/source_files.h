@@ -2,13 +2,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "sheaf/problem.h"
 
 namespace sheaf {
+
+/// A pose as a file stated it, of an image whose pose is what its frame and sensor give.
+struct StatedPose {
+  std::array<double, 7> numbers{};  ///< qw qx qy qz tx ty tz
+  Pose placed{};                    ///< what frame and sensor gave when they were read
+  bool stale = false;               ///< the two differ by more than rounding
+};
 
 /// What only one format can hold, kept for writing the same format again.
 struct SourceFiles {
@@ -17,8 +26,10 @@ struct SourceFiles {
   /// COLMAP, text only: the files as they were, so that what was not changed is written as it
   /// stood, comments and number of digits included.
   std::string cameras, images, points;
-  /// COLMAP, either form: as they were; empty when the model has none.
+  /// COLMAP, either form: as they were, with what problems have no place for (sensors that are no
+  /// cameras or have no pose, rigs and frames without images); empty when the model has none.
   std::string rigs, frames;
+  std::unordered_map<std::uint32_t, StatedPose> stated_poses;  ///< COLMAP, by image id
 
   /// Bundler: all images of the file's list, those that were never placed included.
   std::uint32_t listed_images = 0;

@@ -38,6 +38,34 @@ void turn_round(Pose& pose, bool back) {
   pose.translation[2] = -pose.translation[2];
 }
 
+namespace {
+
+/// The frame that a pose is from, as turn_round does with the one that it leads to.
+void turn_round_source(Pose& pose, bool back) {
+  const auto [w, x, y, z] = pose.rotation;
+  pose.rotation = {x, -w, -z, y};
+  if (back)
+    for (double& q : pose.rotation) q = -q;
+}
+
+/// Of rigs whose images are turned: a rig turns with its reference.
+void turn_rigs(Rigs& rigs, const std::vector<bool>& turned_image, bool back) {
+  std::vector<bool> turned(rigs.num_sensors(), false), turned_rig(rigs.count, false);
+  for (std::size_t j = 0; j < rigs.image_sensor.size(); ++j)
+    if (rigs.image_sensor[j] != Rigs::kNone && turned_image[j]) turned[rigs.image_sensor[j]] = true;
+  for (std::size_t s = 0; s < turned.size(); ++s)
+    if (rigs.is_reference[s] != 0 && turned[s]) turned_rig[rigs.sensor_rig[s]] = true;
+  for (std::size_t s = 0; s < turned.size(); ++s) {
+    if (rigs.is_reference[s] != 0) continue;
+    if (turned[s]) turn_round(rigs.sensor_from_rig[s], back);
+    if (turned_rig[rigs.sensor_rig[s]]) turn_round_source(rigs.sensor_from_rig[s], back);
+  }
+  for (std::size_t f = 0; f < rigs.num_frames(); ++f)
+    if (turned_rig[rigs.frame_rig[f]]) turn_round(rigs.rig_from_world[f], back);
+}
+
+}  // namespace
+
 bool has_bal_cameras(const Problem& problem) {
   return std::any_of(problem.cameras.begin(), problem.cameras.end(),
                      [](const Camera& c) { return c.model == CameraModel::bal; });
@@ -62,8 +90,13 @@ Result<void> to_bal_cameras(Problem& problem) {
   const auto turned = [&](std::uint32_t image) {
     return problem.cameras[problem.image_camera[image]].model != CameraModel::bal;
   };
-  for (std::uint32_t j = 0; j < problem.num_images(); ++j)
-    if (turned(j)) turn_round(problem.poses[j], false);
+  std::vector<bool> turned_images(problem.num_images(), false);
+  for (std::uint32_t j = 0; j < problem.num_images(); ++j) {
+    if (!turned(j)) continue;
+    turn_round(problem.poses[j], false);
+    turned_images[j] = true;
+  }
+  turn_rigs(problem.rigs, turned_images, false);
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
     const std::uint32_t image = problem.observation_image[i];
     if (!turned(image)) continue;
@@ -95,8 +128,13 @@ void from_bal_cameras(Problem& problem) {
       r = std::max(r, std::abs(xy[k]));
     }
   }
-  for (std::uint32_t j = 0; j < problem.num_images(); ++j)
-    if (is_bal(j)) turn_round(problem.poses[j], true);
+  std::vector<bool> turned(problem.num_images(), false);
+  for (std::uint32_t j = 0; j < problem.num_images(); ++j) {
+    if (!is_bal(j)) continue;
+    turn_round(problem.poses[j], true);
+    turned[j] = true;
+  }
+  turn_rigs(problem.rigs, turned, true);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     Camera& camera = problem.cameras[c];
     if (camera.model != CameraModel::bal) continue;

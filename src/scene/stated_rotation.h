@@ -21,11 +21,24 @@ inline bool same_bits(const Quaternion<double>& a, const Quaternion<double>& b) 
   return true;
 }
 
+inline bool same_bits(const Pose& a, const Pose& b) {
+  for (std::size_t k = 0; k < 3; ++k)
+    if (std::bit_cast<std::uint64_t>(a.translation[k]) !=
+        std::bit_cast<std::uint64_t>(b.translation[k]))
+      return false;
+  return same_bits(a.rotation, b.rotation);
+}
+
 /// A quaternion as a file stated it: itself where its length is 1 to rounding, else normalised.
 /// Not of unit length for one that has no direction, or a length that is absurd.
 inline Quaternion<double> rotation_from_stated(const std::array<double, 4>& q) {
   const double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   return std::abs(norm2 - 1) < 4e-15 ? q : normalized(q);
+}
+
+/// A pose of which a file states qw qx qy qz tx ty tz, likewise.
+inline Pose pose_from_stated(const std::array<double, 7>& n) {
+  return {rotation_from_stated(Quaternion<double>{n[0], n[1], n[2], n[3]}), {n[4], n[5], n[6]}};
 }
 
 /// The same of a row-major matrix that is a rotation as nearly as its digits allow; the quaternion

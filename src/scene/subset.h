@@ -10,8 +10,9 @@
 namespace sheaf {
 
 /// Leaves out the observations that are not `kept`, then points with fewer than `least_track`
-/// observations left, together with these; `kept` is then what is left. Images, lenses and features
-/// stay. Returns the number of each point among those left, or kGonePoint.
+/// observations left, together with these and the terms that name them; `kept` is then what is
+/// left. Images, lenses, rigs and features stay. Returns the number of each point among those left,
+/// or kGonePoint.
 inline constexpr std::uint32_t kGonePoint = UINT32_MAX;
 std::vector<std::uint32_t> keep_observations(Problem& problem, std::vector<bool>& kept,
                                              std::uint32_t least_track);

@@ -28,11 +28,15 @@ class ColmapAgrees : public testing::Test {
   /// Exit code of the script on a model, and what it said.
   int ask(const std::string& model, std::string& said) {
     EXPECT_EQ(run({"info", model, "--json", "info.json"}).exit_code, 0);
+    return compare("colmap_agrees.py", folder_ / model, folder_ / "info.json", said);
+  }
+  /// Exit code of a script of this folder on two models, and what it said.
+  int compare(const std::string& script, const std::string& first, const std::string& second,
+              std::string& said) {
     const char* python = std::getenv("SHEAF_PYCOLMAP_PYTHON");
     const std::string line = std::string(python ? python : SHEAF_PYTHON) +
-                             " " SHEAF_SOURCE_DIR "/tests/end_to_end/colmap_agrees.py '" +
-                             (folder_ / model) + "' '" + (folder_ / "info.json") + "' > '" +
-                             (folder_ / "said.txt") + "' 2>&1";
+                             " " SHEAF_SOURCE_DIR "/tests/end_to_end/" + script + " '" + first +
+                             "' '" + second + "' > '" + (folder_ / "said.txt") + "' 2>&1";
     const int status = std::system(line.c_str());
     said = contents_of(folder_ / "said.txt");
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
@@ -54,6 +58,26 @@ TEST_F(ColmapAgrees, OnGeneratedModelsOfEveryCamera) {
     const int status = ask(name + "-solved", said);
     if (status == kNoPycolmap) GTEST_SKIP() << "no pycolmap";
     EXPECT_EQ(status, 0) << name << ": " << said;
+  }
+}
+
+/// Rigs, frames and poses are those that COLMAP reads, in both forms.
+TEST_F(ColmapAgrees, OnRigs) {
+  for (const std::string name : {"stale-image-poses", "imu-reference"}) {
+    const std::string path = std::filesystem::absolute("tests/data/" + name);
+    ASSERT_EQ(run({"convert", path, name + "-binary", "--format", "colmap"}).exit_code, 0);
+    ASSERT_EQ(
+        run({"convert", name + "-binary", name + "-text", "--format", "colmap-text"}).exit_code, 0);
+    for (const std::string form : {"-binary", "-text"}) {
+      std::string said;
+      int status = compare("colmap_rigs_agree.py", folder_ / (name + form),
+                           folder_ / (name + "-text"), said);
+      if (status == kNoPycolmap) GTEST_SKIP() << "no pycolmap";
+      EXPECT_EQ(status, 0) << name << form << ": " << said;
+      // Costs too; the errors of points that the text states are not COLMAP's own.
+      status = ask(name + form, said);
+      EXPECT_EQ(status, 0) << name << form << ": " << said;
+    }
   }
 }
 

@@ -200,7 +200,7 @@ TEST(ColmapMalformed, RigsAreHeldAgainstTheImages) {
       {"bytes behind the frames", [](auto& f) { f.frames += '\0'; }, "m/frames.bin: byte "},
       {"an image without a frame",
        [](auto& f) { put<std::uint64_t>(f.frames, f.frames.size() - 8, 99); },
-       "m/frames.bin: found no frame with image id 12"},
+       "m/frames.bin: byte 176: found image id 99 in frame 12, expected the id of an image"},
   };
   for (const Broken& broken : kinds) expect_refused(broken, with_rigs());
   for (std::size_t cut = 1; cut < rigs_binary().size(); ++cut) {

@@ -153,30 +153,6 @@ TEST(Colmap, PosesOfFramesFollowTheirImages) {
   EXPECT_TRUE(lost_in("colmap", problem).empty());
 }
 
-/// Two images of one frame that moved by themselves have no common pose: said, not written wrong.
-TEST(Colmap, DropsRigsThatTheirImagesContradict) {
-  ColmapFiles binary = tiny_binary();
-  Bytes rigs, frames;
-  rigs.add<std::uint64_t>(1).add<std::uint32_t>(1).add<std::uint32_t>(2);
-  rigs.add<std::int32_t>(0).add<std::uint32_t>(7).add<std::int32_t>(0).add<std::uint32_t>(3);
-  rigs.add<std::uint8_t>(1);
-  for (double x : {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0}) rigs.add(x);
-  frames.add<std::uint64_t>(1).add<std::uint32_t>(1).add<std::uint32_t>(1);
-  for (double x : {0.8, 0.6, 0.0, 0.0, 0.5, 0.25, 5.0}) frames.add(x);
-  frames.add<std::uint32_t>(3);
-  for (auto [camera, image] : {std::pair{7u, 12u}, {3u, 4u}, {3u, 9u}})
-    frames.add<std::int32_t>(0).add<std::uint32_t>(camera).add<std::uint64_t>(image);
-  binary.rigs = rigs.take();
-  binary.frames = frames.take();
-  Problem problem = parse_colmap(binary).value();
-  expect_same_files(format_colmap(problem, false).value(), binary);
-  EXPECT_TRUE(lost_in("colmap", problem).empty());
-  problem.poses[2].translation[1] += 1;
-  EXPECT_EQ(format_colmap(problem, false).value().frames, "");
-  ASSERT_EQ(lost_in("colmap", problem).size(), 1u);
-  EXPECT_NE(lost_in("colmap", problem)[0].find("moved by themselves"), std::string::npos);
-}
-
 /// Every camera model goes through both forms.
 TEST(Colmap, HoldsEveryCameraModel) {
   for (std::size_t i = 1; i < kCameraModels; ++i) {
