@@ -142,8 +142,8 @@ HWY_INLINE void factor_part(const PassElimination& how, const PointSums& p,
   for (int i = 0; i < factor_group::kFields; ++i) store(all[i], out + 8 * i);
 }
 
-/// The rows of batch b as the loss has them, `room` being what source.rows() left there; `weight` is
-/// one over their sigma, if they have one.
+/// The rows of batch b as the loss has them, `room` being what source.rows() left there; `weight`
+/// is one over their sigma, if they have one.
 template <class Source>
 HWY_INLINE void weigh_rows(const EliminationOf<typename Source::State>& in, const Source& source,
                            const GroupPart& of, std::uint64_t b, const LaneChart* chart,

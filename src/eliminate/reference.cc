@@ -235,7 +235,8 @@ void residuals(const Batches& batches, const double* cameras, const double* poin
         const std::uint64_t b = batches.groups[g].first_batch + o;
         const Row row = row_of(batches, cameras, point_of(points, g, l), b, l);
         for (int e = 0; e < 2; ++e)
-          out[16 * (b - chunk.first_batch) + 8 * e + l] = std::abs(row.r[e]);
+          out[16 * (b - chunk.first_batch) + 8 * e + l] =
+              inverse_sigma_at(batches, b, l) * std::abs(row.r[e]);
       }
 }
 

@@ -222,7 +222,8 @@ void residuals(const LensInput& in, const Chunk& chunk, double* out) {
       for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b) {
         const LensRow row = lens_row(in, point_of(in.at.points, g, l), b, l);
         for (std::size_t e = 0; e < 2; ++e)
-          out[16 * (b - chunk.first_batch) + 8 * e + l] = std::abs(row.r[e]);
+          out[16 * (b - chunk.first_batch) + 8 * e + l] =
+              inverse_sigma_at(*in.batches, b, l) * std::abs(row.r[e]);
       }
     }
 }

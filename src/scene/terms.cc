@@ -139,8 +139,8 @@ double cost_of(const Problem& problem, const GaussianPrior& of) {
     if (block.kind == Kind::pose) {
       const Pose pose = pose_of(problem, block.index);
       const RigidMotion<double> state{{s[0], s[1], s[2], s[3]}, {s[4], s[5], s[6]}};
-      const auto log = log_of(
-          composed<double>({pose.rotation, pose.translation}, inverse<double>(state)));
+      const auto log =
+          log_of(composed<double>({pose.rotation, pose.translation}, inverse<double>(state)));
       d.insert(d.end(), log.begin(), log.end());
       continue;
     }

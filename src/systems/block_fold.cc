@@ -199,11 +199,12 @@ void BlockFold::fold_tile(std::size_t tile, const Adjoints& adjoints, const doub
     Product product;
     if (is_tile) {
       const double* from = tiles + kTileDoubles * piece.from;
-      multiply_parts(a, b, adjoints, [&](int r, int k) { return tile_entry(from, r, k); }, product);
+      multiply_parts(
+          a, b, adjoints, [&](int r, int k) { return tile_entry(from, r, k); }, product);
     } else {
       const double* from = diagonal + kDiagonalDoubles * (piece.from - row_tiles_);
-      multiply_parts(a, b, adjoints, [&](int r, int k) { return -diagonal_entry(from, r, k); },
-                     product);
+      multiply_parts(
+          a, b, adjoints, [&](int r, int k) { return -diagonal_entry(from, r, k); }, product);
     }
     for (int r = 0; r < a.count; ++r)
       for (int k = 0; k < b.count; ++k)

@@ -122,7 +122,8 @@ CoarseSpace::State MappedRows::coarse_state() {
   for (std::uint32_t j = 0; j < map_.kept; ++j)
     std::copy_n(held.kept[j].begin(), 3,
                 &records_[kCameraRecord * (map_.first_kept + std::size_t(j))]);
-  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().at.data(), map_.first_kept};
+  return {records_.data(), adjoints_.empty() ? nullptr : adjoints_.front().at.data(),
+          map_.first_kept};
 }
 
 void MappedRows::step(const Buffer<double>& columns) {

@@ -10,6 +10,7 @@
 
 #include "eliminate/kernel_table.h"
 #include "geometry/rotation.h"
+#include "eliminate/weighted.h"
 #include "sheaf/scene.h"
 
 namespace sheaf {
@@ -38,6 +39,8 @@ class KernelsTest : public ::testing::Test {
     problem.add_observation(problem.observation_image[0], problem.observation_point[0], 3, 4);
     const std::uint32_t lonely = problem.add_point(0.1, 0.2, 0.3);
     problem.add_observation(2, lonely, 10, -20);
+    if (weighted_) test::weigh(problem);
+    loss_.weighted = weighted_;
     batches_ = arrange(problem);
     chunks_ = cut_into_chunks(batches_, 9, lists);
     fill(problem);
@@ -105,9 +108,9 @@ class KernelsTest : public ::testing::Test {
     const EliminateInput in{
         &batches_,      &chunks_, cameras_.data(),
         points_.data(), 1e-3,     points_held_,
-        loss_,          chart_,   loss_.kind == LossKind::none ? nullptr : out.own_damping.data()};
+        loss_,          chart_,   loss_.weighs() ? out.own_damping.data() : nullptr};
     out.eliminated.factors = out.factors.data();
-    if (loss_.kind != LossKind::none) out.metric.allocate(kMetricBatch * batches_.num_batches());
+    if (loss_.weighs()) out.metric.allocate(kMetricBatch * batches_.num_batches());
     out.eliminated.metric = out.metric.data();
     out.point_costs.allocate(8 * batches_.groups.size());
     out.eliminated.point_costs = out.point_costs.data();
@@ -171,6 +174,7 @@ class KernelsTest : public ::testing::Test {
   bool points_held_ = false;
   int inner_iterations_ = 3;
   PointBlend blend_;
+  bool weighted_ = false;      ///< observations have sigmas, some points rows of their own
   double own_damping_ = 0.05;  ///< of some points under a loss
   double mean_square_ = 1;     ///< px^2: every point has something to gain
   ScaledLoss loss_;
@@ -246,7 +250,8 @@ void KernelsTest::expect_agreement(double slack, double loose) {
     near(got.square_sum, expected.square_sum);
     EXPECT_EQ(got.trial.newly_behind, expected.trial.newly_behind);
     EXPECT_EQ(got.behind, expected.behind);
-    EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
+    if (!weighted_)
+      EXPECT_NEAR(got.square_sum, got.eliminated.square_sum, 1e-10 * got.square_sum);
   }
 }
 
@@ -275,6 +280,18 @@ TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceWithALoss) {
 constexpr ChartBase kCharts[] = {ChartBase::origin, ChartBase::host};
 ChartRules chart_rules(ChartBase base, bool crosses) {
   return {base, {0.3, -0.2, 0.5}, 0.25, crosses, 1e-2};
+}
+
+TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceWithSigmasAndPriors) {
+  weighted_ = true;
+  for (LossKind kind : {LossKind::none, LossKind::huber, LossKind::cauchy})
+    for (ChartBase base : {ChartBase::none, ChartBase::host}) {
+      SCOPED_TRACE(to_string(kind));
+      chart_.base = base;
+      make(false, ChunkLists::pairs);
+      loss_ = {kind, 5.0, 0.1, true};
+      expect_agreement(1000);
+    }
 }
 
 TEST_F(KernelsTest, EveryInstructionSetMatchesTheReferenceInCharts) {

@@ -17,6 +17,7 @@
 #include "geometry/rotation.h"
 #include "lists/lens_chunks.h"
 #include "platform/parallel.h"
+#include "eliminate/weighted.h"
 #include "solve/lens_problems.h"
 #include "systems/arrangement.h"
 
@@ -141,7 +142,7 @@ void LensProblem::eliminate(const LensKernels& kernels, Outcome& out) const {
       settings_.points_held,
       settings_.loss,
       settings_.chart,
-      settings_.loss.kind == LossKind::none ? nullptr : out.own_damping.data()};
+      settings_.loss.weighs() ? out.own_damping.data() : nullptr};
   const bool poses_alone = std::all_of(tracks.lenses.begin(), tracks.lenses.end(),
                                        [](const LensPlaces& lens) { return lens.riders == 0; });
   for (std::size_t c = 0; c < chunks_.chunks.chunks.size(); ++c) {
@@ -187,7 +188,7 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
   out.kept.allocate(8 * kept_row::fields(arranged_.tracks.most_blocks) * batches.num_batches());
   out.gradient.allocate(kProductRecord * arranged_.tracks.num_blocks);
   out.factors.allocate(kFactorGroup * batches.groups.size());
-  if (settings_.loss.kind != LossKind::none)
+  if (settings_.loss.weighs())
     out.metric.allocate(kMetricBatch * batches.num_batches());
   out.trial_points.allocate(points_.size());
   out.residuals.allocate(16 * batches.num_batches());
@@ -327,6 +328,18 @@ TEST(LensKernels, MixedLensesAreEquivalentToReference) {
         settings.loss = {loss, loss == LossKind::tukey ? 5.0 : 1.0, 0.05};
         expect_equivalence(problem, hold ? Fixed{} : nothing_held(problem), settings);
       }
+}
+
+TEST(LensKernels, SigmasAndPriorsAreEquivalentToReference) {
+  for (Problem problem : mixtures())
+    for (LossKind loss : {LossKind::none, LossKind::huber, LossKind::cauchy}) {
+      SCOPED_TRACE(to_string(loss));
+      problem.observation_sigma.clear(), problem.terms.points.clear();
+      test::weigh(problem);
+      Settings settings;
+      settings.loss = {loss, 1.0, 0.05, true};
+      expect_equivalence(problem, {}, settings);
+    }
 }
 
 TEST(LensKernels, EveryListIsEquivalentToReference) {

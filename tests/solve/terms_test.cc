@@ -51,8 +51,7 @@ void add_points(Problem& p) {
 }
 double distance_of(const Problem& p, std::uint32_t a, std::uint32_t b) {
   double sum = 0;
-  for (std::size_t k = 0; k < 3; ++k)
-    sum += std::pow(p.points[3 * a + k] - p.points[3 * b + k], 2);
+  for (std::size_t k = 0; k < 3; ++k) sum += std::pow(p.points[3 * a + k] - p.points[3 * b + k], 2);
   return std::sqrt(sum);
 }
 /// The scene 3 % larger than it is.
