@@ -66,7 +66,7 @@ int run(const Arguments& arguments) {
   check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);
-  const Json laid = lay_rigs(arguments.rigs, input);
+  const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   const std::string counts = counts_text(input.problem);
   CleanRecord cleaned;
   if (arguments.clean.any()) cleaned = clean(input.problem, arguments.clean);

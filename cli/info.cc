@@ -174,7 +174,7 @@ int run(const Arguments& arguments) {
   check_outputs({{"--pattern", arguments.pattern}, {"--json", json}});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json read = input_json(arguments.in, input);
-  const Json laid = lay_rigs(arguments.rigs, input);
+  const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   const Statistics statistics = statistics_of(input.problem);
   const Evaluation evaluation = evaluate(input.problem);
   print(arguments.in, input, statistics, evaluation);

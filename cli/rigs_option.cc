@@ -65,20 +65,21 @@ std::vector<BoundOption> options_of(RigsArguments& arguments) {
       arguments);
 }
 
-Json lay_rigs(const RigsArguments& arguments, InputFile& input) {
+Json lay_rigs(const RigsArguments& arguments, InputFile& input, bool quiet) {
   if (arguments.path.empty()) return {};
   const RigConfigurationFile file = read_rig_configuration(arguments.path).value();
   const Result<RigLayout> laid = lay_rigs(input.problem, file.rigs);
   if (!laid.ok()) throw Error(laid.error().code(), arguments.path + ": " + laid.error().what());
   const RigLayout& layout = laid.value();
-  report(layout, arguments.path);
+  if (!quiet) report(layout, arguments.path);
   input.notes.insert(input.notes.end(), file.notes.begin(), file.notes.end());
   return {{"path", arguments.path},
           {"sensors", sensors_json(layout)},
           {"frames", layout.frames},
           {"images", layout.images},
           {"images_of_no_rig", layout.images_of_no_rig},
-          {"copied_cameras", layout.copied_cameras}};
+          {"copied_cameras", layout.copied_cameras},
+          {"notes", file.notes}};
 }
 
 }  // namespace sheaf

@@ -18,8 +18,8 @@ struct RigsArguments {
 std::vector<BoundOption> options_of(RigsArguments& arguments);
 
 /// Lays the rigs of the file over the problem; says on stderr where sensors sit and how far the
-/// images' poses strayed, and adds to the notes what of the file is not used. The same as JSON;
-/// null without the option. Throws Error.
-Json lay_rigs(const RigsArguments& arguments, InputFile& input);
+/// images' poses strayed (unless quiet), and adds to the notes what of the file is not used. The
+/// same as JSON; null without the option. Throws Error.
+Json lay_rigs(const RigsArguments& arguments, InputFile& input, bool quiet);
 
 }  // namespace sheaf

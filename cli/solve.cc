@@ -101,7 +101,7 @@ int run(Arguments& arguments) {
   record.options = options_json(options_of(arguments.solve));
   record.read_s = input.read_s;
   if (wants_json) record.input = input_json(arguments.in, input);
-  record.rig_configuration = lay_rigs(arguments.rigs, input);
+  record.rig_configuration = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   if (wants_json) record.before = evaluate(problem);
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
 

@@ -167,6 +167,8 @@ void judge(const fs::path& final, const RunSetting& setting, SolverRun& run) {
 /// unit quaternions, and no rigs tie images together.
 void write_model(const Problem& problem, const fs::path& folder) {
   Problem plain = problem;
+  place_images(plain);
+  plain.rigs = {};
   SceneMetadata names;
   if (problem.metadata) names = *problem.metadata;
   names.stated_rotations.clear();

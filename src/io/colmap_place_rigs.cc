@@ -1,6 +1,7 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <set>
 #include <unordered_map>
 
 #include "io/colmap_draft.h"
@@ -78,13 +79,12 @@ class Placing {
       const std::string which = "rig " + std::to_string(rig.id);
       if (!rig_of_id_.emplace(rig.id, r).second)
         return refuse("rigs", rig.place, which + " a second time", "ids that differ");
-      for (std::size_t k = 0; k < rig.sensors.size(); ++k) {
-        const RigSensor& sensor = rig.sensors[k];
-        for (std::size_t before = 0; before < k; ++before)
-          if (rig.sensors[before].type == sensor.type && rig.sensors[before].id == sensor.id)
-            return refuse("rigs", rig.place,
-                          "sensor " + std::to_string(sensor.id) + " of " + which + " a second time",
-                          "sensors that differ");
+      std::set<std::pair<SensorType, std::uint32_t>> sensors;
+      for (const RigSensor& sensor : rig.sensors) {
+        if (!sensors.emplace(sensor.type, sensor.id).second)
+          return refuse("rigs", rig.place,
+                        "sensor " + std::to_string(sensor.id) + " of " + which + " a second time",
+                        "sensors that differ");
         if (sensor.type == SensorType::camera && !camera_of_id_.contains(sensor.id))
           return refuse("rigs", rig.place,
                         "camera id " + std::to_string(sensor.id) + " in " + which,

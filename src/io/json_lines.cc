@@ -6,6 +6,7 @@
 #include <charconv>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "io/line_cursor.h"
 
@@ -88,9 +89,12 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
     key_ = value;
     return true;
   }
-  bool parse_error(std::size_t, const std::string& token,
-                   const nlohmann::detail::exception&) override {
-    refusal = token.empty() ? "the end of the text" : sheaf::quoted(token);
+  bool parse_error(std::size_t, const std::string&,
+                   const nlohmann::detail::exception& error) override {
+    const bool ended = std::string_view(error.what()).find("end of input") != std::string::npos;
+    refusal = ended || seen_ == text_.data()
+                  ? "the end of the text"
+                  : sheaf::quoted(std::string_view(seen_ - 1, 1)) + " where it cannot stand";
     return false;
   }
 

@@ -45,7 +45,7 @@ TEST(RigConfigurationFile, SaysWhereAndWhatIsWrong) {
   const struct {
     const char *from, *to, *expected;
   } changes[] = {
-      {"[\n  {", "{\n  \"rig\": {", "rig.json:13: found ']', expected JSON"},
+      {"[\n  {", "{\n  \"rig\": {", "rig.json:15: found ']' where it cannot stand, expected JSON"},
       {"\"image_prefix\": \"right/\",", "", "rig.json:5: found a camera without \"image_prefix\""},
       {"\"right/\"", "7", "rig.json:6: found 7, expected a text"},
       {"[2, 0,\n           0, 0]", "[2, 0,\n           0]",
