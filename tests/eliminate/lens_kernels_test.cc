@@ -14,10 +14,10 @@
 
 #include "eliminate/close_sums.h"
 #include "eliminate/kernel_table.h"
+#include "eliminate/weighted.h"
 #include "geometry/rotation.h"
 #include "lists/lens_chunks.h"
 #include "platform/parallel.h"
-#include "eliminate/weighted.h"
 #include "solve/lens_problems.h"
 #include "systems/arrangement.h"
 
@@ -136,13 +136,12 @@ void LensProblem::eliminate(const LensKernels& kernels, Outcome& out) const {
   Buffer<double> scratch(layout_.doubles);
   scratch.fill(std::nan(""));  // what was there before must not matter
   const LensRecords records = layout_.in(scratch.data());
-  const LensEliminateInput in{
-      input(),
-      settings_.damping,
-      settings_.points_held,
-      settings_.loss,
-      settings_.chart,
-      settings_.loss.weighs() ? out.own_damping.data() : nullptr};
+  const LensEliminateInput in{input(),
+                              settings_.damping,
+                              settings_.points_held,
+                              settings_.loss,
+                              settings_.chart,
+                              settings_.loss.weighs() ? out.own_damping.data() : nullptr};
   const bool poses_alone = std::all_of(tracks.lenses.begin(), tracks.lenses.end(),
                                        [](const LensPlaces& lens) { return lens.riders == 0; });
   for (std::size_t c = 0; c < chunks_.chunks.chunks.size(); ++c) {
@@ -188,8 +187,7 @@ Outcome LensProblem::run(const LensKernels& kernels) const {
   out.kept.allocate(8 * kept_row::fields(arranged_.tracks.most_blocks) * batches.num_batches());
   out.gradient.allocate(kProductRecord * arranged_.tracks.num_blocks);
   out.factors.allocate(kFactorGroup * batches.groups.size());
-  if (settings_.loss.weighs())
-    out.metric.allocate(kMetricBatch * batches.num_batches());
+  if (settings_.loss.weighs()) out.metric.allocate(kMetricBatch * batches.num_batches());
   out.trial_points.allocate(points_.size());
   out.residuals.allocate(16 * batches.num_batches());
   for (Buffer<double>* of : {&out.tiles, &out.diagonal, &out.product, &out.gradient, &out.factors})
