@@ -23,11 +23,49 @@ struct TermLoss {
   double scale = 1;
 };
 
-/// The centre of a camera, -R^T t, was measured: cost 1/2 rho(e^T C^-1 e), e = centre - position.
+/// Where a camera was has been measured, such as by GPS: cost 1/2 rho(e^T C^-1 e) with
+/// e = R^T (lever_arm - t) - position. Without a lever arm that is the camera's centre.
 struct CentrePrior {
   std::uint32_t image = 0;
   std::array<double, 3> position{};           ///< world, scene units
   Covariance3 covariance = kUnitCovariance3;  ///< scene units squared
+  TermLoss loss{};
+  std::array<double, 3> lever_arm{};  ///< where the antenna is in the camera's frame, scene units
+};
+
+/// The rotation of an image was measured: cost 1/2 rho(e^T C^-1 e), e = log(R rotation^-1), radians.
+struct RotationPrior {
+  std::uint32_t image = 0;
+  std::array<double, 4> rotation{1, 0, 0, 0};  ///< cam_from_world, unit quaternion (w, x, y, z)
+  Covariance3 covariance = kUnitCovariance3;   ///< rad^2, in the camera's frame
+  TermLoss loss{};
+};
+
+/// The direction of gravity was measured in a camera's frame: cost 1/2 rho(|e / sigma|^2),
+/// e = (R down) x measured with unit vectors, the sine of the angle between them.
+struct GravityPrior {
+  std::uint32_t image = 0;
+  std::array<double, 3> measured{0, 1, 0};  ///< unit vector, camera's frame
+  std::array<double, 3> down{0, 0, -1};     ///< unit vector, world
+  double sigma_rad = 1;
+  TermLoss loss{};
+};
+
+/// The motion between two images was measured: cost 1/2 rho(|S d|^2) with
+/// d = log(T_second T_first^-1 second_from_first^-1), (rho, phi).
+struct RelativePosePrior {
+  std::uint32_t first = 0, second = 0;         ///< images
+  std::array<double, 4> rotation{1, 0, 0, 0};  ///< of second_from_first, unit quaternion
+  std::array<double, 3> translation{};         ///< scene units
+  std::array<double, 36> square_root{};        ///< S, row-major: S^T S is the inverse covariance
+  TermLoss loss{};
+};
+
+/// A parameter of a lens was measured: cost 1/2 rho(((parameter - value) / sigma)^2).
+struct ParameterPrior {
+  std::uint32_t camera = 0;
+  std::uint32_t parameter = 0;  ///< as the camera's model numbers them
+  double value = 0, sigma = 1;  ///< in the parameter's unit
   TermLoss loss{};
 };
 
@@ -68,6 +106,10 @@ struct GaussianPrior {
 /// and the few points that are not eliminated because terms tie them. Costs count in sigmas.
 struct Terms {
   std::vector<CentrePrior> centres;
+  std::vector<RotationPrior> rotations;
+  std::vector<GravityPrior> gravities;
+  std::vector<RelativePosePrior> relative_poses;
+  std::vector<ParameterPrior> parameters;
   std::vector<PointPrior> points;
   std::vector<DistancePrior> distances;
   std::vector<GaussianPrior> gaussians;
@@ -76,15 +118,20 @@ struct Terms {
   std::vector<std::uint32_t> kept_points;
 
   bool empty() const {
-    return centres.empty() && points.empty() && distances.empty() && gaussians.empty() &&
+    return centres.empty() && rotations.empty() && gravities.empty() && relative_poses.empty() &&
+           parameters.empty() && points.empty() && distances.empty() && gaussians.empty() &&
            kept_points.empty();
   }
 };
 
 /// What each kind of terms costs: 1/2 sum rho, in sigmas squared.
 struct TermCosts {
-  double centres = 0, points = 0, distances = 0, gaussians = 0;
-  double total() const { return centres + points + distances + gaussians; }
+  double centres = 0, rotations = 0, gravities = 0, relative_poses = 0, parameters = 0, points = 0,
+         distances = 0, gaussians = 0;
+  double total() const {
+    return centres + rotations + gravities + relative_poses + parameters + points + distances +
+           gaussians;
+  }
 };
 
 }  // namespace sheaf
