@@ -104,7 +104,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
     if (!open_.empty()) {
       JsonValue& parent = *open_.back();
       place = parent.kind == Kind::list ? &parent.items.emplace_back()
-                                        : &parent.members.emplace_back(key_, JsonValue()).second;
+                                        : &parent.members.emplace_back(JsonMember{key_, {}}).value;
     }
     place->kind = kind;
     place->line = line();

@@ -13,19 +13,25 @@ namespace sheaf {
 
 /// A value of a JSON text, with the line where it ends (that of a list or an object: where it
 /// begins).
+struct JsonMember;
 struct JsonValue {
   enum class Kind : std::uint8_t { null, boolean, number, text, list, object } kind = Kind::null;
   bool boolean = false;
   double number = 0;
   std::string text;
   std::vector<JsonValue> items;
-  std::vector<std::pair<std::string, JsonValue>> members;
+  std::vector<JsonMember> members;
   std::uint64_t line = 1;  ///< counted from 1
 
   /// The member of that name, the last one where there are several; null where there is none.
   const JsonValue* find(const std::string& name) const;
   /// As a message shows it: "a list", "'word'", "1.5".
   std::string shown() const;
+};
+
+struct JsonMember {
+  std::string name;
+  JsonValue value;
 };
 
 /// Errors: unreadable_input, NAME:LINE: found ..., expected JSON.

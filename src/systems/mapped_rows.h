@@ -60,7 +60,6 @@ class MappedRows : public PointRows {
   const std::unique_ptr<PointRows> rows_;
   const Columns& columns_;
   const BlockMap& map_;
-  Threads& threads_;
   BlockFold fold_;
   Chunks solved_chunks_;
   const SteppedState* state_ = nullptr;
