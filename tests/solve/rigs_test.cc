@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "lists/block_map.h"
+#include "sheaf/scene.h"
 #include "sheaf/solve.h"
 #include "solve/rig_problems.h"
 #include "solve/wide_textbook.h"
@@ -115,6 +117,52 @@ TEST_P(RigSteps, AreTheSameBitsOnAnyThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Variants, RigSteps, testing::Range(0, 11),
                          [](const auto& info) { return std::string(variants()[info.param].name); });
+
+/// Frames enough for a coarse space, whose clusters move kept points, too, and feel what terms
+/// couple.
+TEST(LongDrive, EndsAlikeByEverySolver) {
+  RigSceneOptions street;
+  street.frames = 70;
+  street.single_images = 4;
+  street.scene.points = 1200;
+  street.sensor_rotation_noise_rad = 0.002;
+  const Scene scene = generate(street).value();
+  Problem start = scene.start;
+  for (std::uint32_t i = 0; i < start.num_images(); i += 9) {
+    const Pose pose = pose_of(scene.truth, i);
+    const auto R = matrix_from_quaternion(pose.rotation);
+    CentrePrior prior;
+    prior.image = i;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t r = 0; r < 3; ++r) prior.position[k] -= R[3 * r + k] * pose.translation[r];
+    prior.covariance = {1e-4, 0, 0, 0, 1e-4, 0, 0, 0, 1e-4};
+    start.terms.centres.push_back(prior);
+  }
+  for (std::uint32_t j = 0; j + 40 < start.num_points(); j += 100) {
+    double square = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      square += std::pow(scene.truth.points[3 * j + k] - scene.truth.points[3 * (j + 40) + k], 2);
+    start.terms.distances.push_back({j, j + 40, std::sqrt(square), 0.01, {}});
+  }
+  double first = 0;
+  for (const auto solver : {CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
+                            CameraSolverKind::iterative_implicit})
+    for (const auto precision : {Precision::full, Precision::mixed}) {
+      Problem p = start;
+      SolveOptions options;
+      options.solver = solver;
+      options.precision = precision;
+      options.tolerance = 1e-12;
+      const Summary summary = solve(p, options);
+      if (first == 0) first = summary.final_cost;
+      EXPECT_NEAR(summary.final_cost, first, 1e-8 * first) << summary.solver;
+      EXPECT_LT(summary.iterations.size(), 30u) << summary.solver;
+      int most = 0;
+      for (const Iteration& it : summary.iterations) most = std::max(most, it.linear_iterations);
+      EXPECT_LT(most, 120) << summary.solver;
+      expect_rigid(p);
+    }
+}
 
 }  // namespace
 }  // namespace sheaf
