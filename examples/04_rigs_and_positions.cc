@@ -1,8 +1,8 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// A stereo pair that is driven along a street: its images move as one, its mounting is refined. Some
-// positions were measured, one of them 50 units off, and a distance between two points.
+// A stereo pair that is driven along a street: its images move as one, its mounting is refined.
+// Some positions were measured, one of them 50 units off, and a distance between two points.
 
 #include <sheaf/sheaf.h>
 

@@ -36,8 +36,8 @@ struct LensCounts {
 /// What decides how much a solver costs; counted before it allocates anything.
 struct WorkCounts {
   std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
-  std::uint64_t pairs = 0;  ///< of observations of one point: products to form S
-  std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
+  std::uint64_t pairs = 0;          ///< of observations of one point: products to form S
+  std::uint64_t tiles = 0;          ///< off-diagonal blocks of S; an upper bound above kExactImages
   std::uint64_t solved_tiles = 0;   ///< of what the rows' blocks hang on; 0: as tiles
   std::uint64_t solved_blocks = 0;  ///< likewise; 0: as images
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
