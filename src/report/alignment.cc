@@ -31,12 +31,6 @@ Vector3<double> mean_of(const std::vector<Vector3<double>>& points,
 
 }  // namespace
 
-Vector3<double> Similarity::operator()(const Vector3<double>& X) const {
-  Vector3<double> out = multiply(matrix_from_quaternion(rotation), X);
-  for (int k = 0; k < 3; ++k) out[k] = scale * out[k] + translation[k];
-  return out;
-}
-
 Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
                 const std::vector<double>& weights) {
   if (from.empty()) return {};

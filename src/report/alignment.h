@@ -2,22 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
 #include "geometry/rotation.h"
+#include "scene/similarity.h"
 
 namespace sheaf {
-
-/// Sim(3): X -> s R X + t.
-struct Similarity {
-  double scale = 1;
-  Quaternion<double> rotation{1, 0, 0, 0};
-  Vector3<double> translation{0, 0, 0};
-
-  Vector3<double> operator()(const Vector3<double>& X) const;
-};
 
 struct Alignment {
   Similarity similarity;
