@@ -158,6 +158,10 @@ Json cost_parts_json(const Summary& s) {
   const TermCosts &a = s.initial_terms, &b = s.final_terms;
   return {{"observations", part_json(s.initial_cost - a.total(), s.final_cost - b.total())},
           {"centres", part_json(a.centres, b.centres)},
+          {"rotations", part_json(a.rotations, b.rotations)},
+          {"gravities", part_json(a.gravities, b.gravities)},
+          {"relative_poses", part_json(a.relative_poses, b.relative_poses)},
+          {"parameters", part_json(a.parameters, b.parameters)},
           {"points", part_json(a.points, b.points)},
           {"distances", part_json(a.distances, b.distances)},
           {"gaussians", part_json(a.gaussians, b.gaussians)}};

@@ -33,7 +33,8 @@ struct CentrePrior {
   std::array<double, 3> lever_arm{};  ///< where the antenna is in the camera's frame, scene units
 };
 
-/// The rotation of an image was measured: cost 1/2 rho(e^T C^-1 e), e = log(R rotation^-1), radians.
+/// The rotation of an image was measured: cost 1/2 rho(e^T C^-1 e), e = log(R rotation^-1),
+/// radians.
 struct RotationPrior {
   std::uint32_t image = 0;
   std::array<double, 4> rotation{1, 0, 0, 0};  ///< cam_from_world, unit quaternion (w, x, y, z)

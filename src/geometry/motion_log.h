@@ -47,6 +47,20 @@ RigidMotion<Scalar> inverse(const RigidMotion<Scalar>& T) {
   return {back, {-t[0], -t[1], -t[2]}};
 }
 
+/// Ad(T) = [R, [t]x R; 0, R], 6 x 6, row-major: T exp(d^) T^-1 = exp((Ad(T) d)^).
+inline std::array<double, 36> adjoint_of(const RigidMotion<double>& T) {
+  const Matrix3<double> R = matrix_from_quaternion(T.rotation);
+  const Vector3<double>& t = T.translation;
+  std::array<double, 36> A{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t k = 0; k < 3; ++k) {
+      A[6 * r + k] = A[6 * (3 + r) + 3 + k] = R[3 * r + k];
+      const std::size_t s = (r + 1) % 3, u = (r + 2) % 3;
+      A[6 * r + 3 + k] = t[s] * R[3 * u + k] - t[u] * R[3 * s + k];
+    }
+  return A;
+}
+
 /// The derivative of log(exp(d') T) by d' at 0, T = exp(d): the inverse left Jacobian of SE(3), 6 x
 /// 6, row-major (Barfoot, State Estimation for Robotics, 2017, section 7.1.5):
 ///   [J^-1, -J^-1 Q J^-1; 0, J^-1], J = V(phi).

@@ -115,9 +115,47 @@ double cost_of(const Problem& problem, const CentrePrior& of) {
   Vector3<double> e;
   for (std::size_t k = 0; k < 3; ++k) {
     e[k] = -of.position[k];
-    for (std::size_t i = 0; i < 3; ++i) e[k] -= R[3 * i + k] * pose.translation[i];
+    for (std::size_t i = 0; i < 3; ++i)
+      e[k] += R[3 * i + k] * (of.lever_arm[i] - pose.translation[i]);
   }
   return half_rho(of.loss, whitened_square(of.covariance, e));
+}
+
+RigidMotion<double> motion_of(const Problem& problem, std::uint32_t image) {
+  const Pose pose = pose_of(problem, image);
+  return {pose.rotation, pose.translation};
+}
+
+double cost_of(const Problem& problem, const RotationPrior& of) {
+  const Quaternion<double>& q = of.rotation;
+  const Vector3<double> phi = angle_axis_from_quaternion(
+      multiply(pose_of(problem, of.image).rotation, Quaternion<double>{q[0], -q[1], -q[2], -q[3]}));
+  return half_rho(of.loss, whitened_square(of.covariance, phi));
+}
+
+double cost_of(const Problem& problem, const GravityPrior& of) {
+  const Matrix3<double> R = matrix_from_quaternion(pose_of(problem, of.image).rotation);
+  const Vector3<double> e = cross(multiply(R, of.down), of.measured);
+  return half_rho(of.loss,
+                  (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / (of.sigma_rad * of.sigma_rad));
+}
+
+double cost_of(const Problem& problem, const RelativePosePrior& of) {
+  const auto b_from_a =
+      composed(motion_of(problem, of.second), inverse(motion_of(problem, of.first)));
+  const auto d = log_of(composed(b_from_a, inverse<double>({of.rotation, of.translation})));
+  double square = 0;
+  for (std::size_t row = 0; row < 6; ++row) {
+    double r = 0;
+    for (std::size_t k = 0; k < 6; ++k) r += of.square_root[6 * row + k] * d[k];
+    square += r * r;
+  }
+  return half_rho(of.loss, square);
+}
+
+double cost_of(const Problem& problem, const ParameterPrior& of) {
+  const double r = (problem.cameras[of.camera].parameters[of.parameter] - of.value) / of.sigma;
+  return half_rho(of.loss, r * r);
 }
 
 double cost_of(const Problem& problem, const PointPrior& of) {
@@ -165,6 +203,10 @@ double cost_of(const Problem& problem, const GaussianPrior& of) {
 TermCosts evaluate_terms(const Problem& problem) {
   TermCosts out;
   for (const auto& of : problem.terms.centres) out.centres += cost_of(problem, of);
+  for (const auto& of : problem.terms.rotations) out.rotations += cost_of(problem, of);
+  for (const auto& of : problem.terms.gravities) out.gravities += cost_of(problem, of);
+  for (const auto& of : problem.terms.relative_poses) out.relative_poses += cost_of(problem, of);
+  for (const auto& of : problem.terms.parameters) out.parameters += cost_of(problem, of);
   for (const auto& of : problem.terms.points) out.points += cost_of(problem, of);
   for (const auto& of : problem.terms.distances) out.distances += cost_of(problem, of);
   for (const auto& of : problem.terms.gaussians) out.gaussians += cost_of(problem, of);
@@ -182,6 +224,72 @@ std::vector<std::uint32_t> kept_points(const Terms& terms) {
   return kept;
 }
 
+namespace {
+
+bool is_unit(const double* v, std::size_t count) {
+  double norm2 = 0;
+  for (std::size_t k = 0; k < count; ++k) norm2 += v[k] * v[k];
+  return std::abs(norm2 - 1) < 1e-6;
+}
+
+std::optional<std::string> wrong_loss(const TermLoss& loss) {
+  if (loss.kind != LossKind::none && !(loss.scale > 0)) return "the loss needs a scale above 0";
+  return {};
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const RotationPrior& of) {
+  if (of.image >= problem.num_images()) return "it names an image that there is not";
+  if (!is_unit(of.rotation.data(), 4)) return "the rotation is not a unit quaternion";
+  if (!whitening(of.covariance)) return "the covariance is not symmetric and positive definite";
+  return wrong_loss(of.loss);
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const GravityPrior& of) {
+  if (of.image >= problem.num_images()) return "it names an image that there is not";
+  if (!is_unit(of.measured.data(), 3) || !is_unit(of.down.data(), 3))
+    return "both directions must be unit vectors";
+  if (!(of.sigma_rad > 0) || !std::isfinite(of.sigma_rad))
+    return "the sigma must be a finite number above 0";
+  return wrong_loss(of.loss);
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const RelativePosePrior& of) {
+  if (of.first >= problem.num_images() || of.second >= problem.num_images())
+    return "it names an image that there is not";
+  if (of.first == of.second) return "both images are the same";
+  if (!is_unit(of.rotation.data(), 4)) return "the rotation is not a unit quaternion";
+  if (!finite({of.translation.begin(), of.translation.end()}) ||
+      !finite({of.square_root.begin(), of.square_root.end()}))
+    return "a number is not finite";
+  return wrong_loss(of.loss);
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const ParameterPrior& of) {
+  if (of.camera >= problem.cameras.size()) return "it names a camera that there is not";
+  const CameraModel model = problem.cameras[of.camera].model;
+  if (of.parameter >= parameter_count(model))
+    return std::string(to_string(model)) + " has " + std::to_string(parameter_count(model)) +
+           " parameters";
+  if (!(of.sigma > 0) || !std::isfinite(of.sigma) || !std::isfinite(of.value))
+    return "the value must be finite, its sigma finite and above 0";
+  return wrong_loss(of.loss);
+}
+
+std::optional<std::string> wrong_pose_terms(const Problem& problem) {
+  const auto first_wrong = [&](const char* what, const auto& all) -> std::optional<std::string> {
+    for (const auto& of : all)
+      if (const auto wrong = wrong_term(problem, of)) return at(what, all, of, *wrong);
+    return {};
+  };
+  const Terms& terms = problem.terms;
+  if (auto wrong = first_wrong("rotation prior", terms.rotations)) return wrong;
+  if (auto wrong = first_wrong("gravity", terms.gravities)) return wrong;
+  if (auto wrong = first_wrong("relative pose", terms.relative_poses)) return wrong;
+  return first_wrong("parameter prior", terms.parameters);
+}
+
+}  // namespace
+
 std::optional<std::string> wrong_terms(const Problem& problem) {
   const Terms& terms = problem.terms;
   for (const CentrePrior& of : terms.centres) {
@@ -189,6 +297,7 @@ std::optional<std::string> wrong_terms(const Problem& problem) {
     if (of.image >= problem.num_images()) wrong = "it names an image that there is not";
     if (wrong) return at("centre prior", terms.centres, of, *wrong);
   }
+  if (auto wrong = wrong_pose_terms(problem)) return wrong;
   std::set<std::uint32_t> named;
   for (const PointPrior& of : terms.points) {
     auto wrong = wrong_position(of.position, of.covariance, {});

@@ -36,12 +36,12 @@ class BalView {
   /// One measurement likewise.
   std::array<double, 2> turned(const Problem& problem, std::size_t image,
                                const std::array<double, 2>& xy) const;
+  /// Whether this image's camera is turned round.
+  bool turns(const Problem& problem, std::size_t image) const;
   /// What was refined, back into the problem's own models.
   void store(const CameraState& cameras, Problem& problem) const;
 
  private:
-  bool turns(const Problem& problem, std::size_t image) const;
-
   bool turns_ = false;
   std::vector<std::uint8_t> sensor_turns_;  ///< of each sensor of rigs
   std::vector<RadialView> views_;           ///< of each camera

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "geometry/rotation.h"
+#include "geometry/motion_log.h"
 #include "lists/block_layout.h"
 
 namespace sheaf {
@@ -84,15 +84,10 @@ void add_vectors(const BlockPart& part, const Adjoints& adjoints, const double* 
 Adjoints adjoints_of(const CameraState& cameras) {
   Adjoints out;
   for (const RigidMotion<double>& sensor : cameras.sensors) {
-    const Matrix3<double> R = matrix_from_quaternion(sensor.rotation);
-    const auto& t = sensor.translation;
-    auto& A = out.emplace_back().at;
-    for (std::size_t r = 0; r < 3; ++r)
-      for (std::size_t k = 0; k < 3; ++k) {
-        A[8 * r + k] = A[8 * (3 + r) + 3 + k] = R[3 * r + k];
-        const std::size_t s = (r + 1) % 3, u = (r + 2) % 3;
-        A[8 * r + 3 + k] = t[s] * R[3 * u + k] - t[u] * R[3 * s + k];
-      }
+    const std::array<double, 36> A = adjoint_of(sensor);
+    Adjoint& to = out.emplace_back();
+    for (std::size_t r = 0; r < kPose; ++r)
+      std::copy_n(&A[kPose * r], kPose, &to.at[Adjoint::kStride * r]);
   }
   return out;
 }

@@ -83,7 +83,8 @@ void join_kept(const Problem& problem, const std::vector<std::uint32_t>& kept, c
 
 /// Whether terms are of states that BAL's view would restate.
 bool restates_terms(const Problem& problem) {
-  return !problem.terms.gaussians.empty() && !has_only_bal_cameras(problem);
+  return (!problem.terms.gaussians.empty() || !problem.terms.parameters.empty()) &&
+         !has_only_bal_cameras(problem);
 }
 
 /// A few hundred megabytes are worth a pass over the observations at the end.

@@ -83,8 +83,8 @@ void add_iterative(const WorkCounts& c, const Plan& plan, std::uint64_t slices, 
   sum.add(c.images, kVector, 2);
   sum.add(RecycledModes::most_bytes(c.columns), 1);
   if (plan.kind == SolverKind::explicit_cg) {
-    sum.add(2 * c.tiles + c.images, 8 * kBlockEntry);  // in the end double, mixed or not
-    sum.add(2 * c.tiles + c.images, 4);
+    sum.add(matrix_blocks(c), 8 * kBlockEntry);  // in the end double, mixed or not
+    sum.add(matrix_blocks(c), 4);
     sum.add(2 * c.tiles, 8);
     sum.add(c.images, kVector, 2);
   }

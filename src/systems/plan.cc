@@ -104,7 +104,7 @@ double sparse_seconds(const WorkCounts& c) {
                                       kSparseEntryNs * static_cast<double>(c.sparse_doubles));
 }
 double explicit_seconds(const WorkCounts& c) {
-  const double blocks = 2 * static_cast<double>(c.tiles) + static_cast<double>(c.images);
+  const auto blocks = static_cast<double>(matrix_blocks(c));
   return forming_seconds(c) + coarse_seconds(c) +
          seconds(kPlaceNs * static_cast<double>(c.tiles) + iterations(c) * kBlockNs * blocks);
 }
@@ -146,8 +146,12 @@ void count_factor(const Columns& columns, const BlockMap* map, const std::vector
   c.sparse_flops = n * n * n / 3;
   c.sparse_doubles = c.columns * (c.columns + 8);
   if (tiles.size() == c.tiles) {
-    c.analysis = map == nullptr ? analyse_columns(columns, tiles)
-                                : analyse_columns(map->columns, map->solved_tiles(tiles));
+    const std::vector<Tile> solved = map == nullptr ? tiles : map->solved_tiles(tiles);
+    if (map != nullptr) {
+      c.solved_tiles = solved.size();
+      c.solved_blocks = map->columns.num_images();
+    }
+    c.analysis = analyse_columns(map == nullptr ? columns : map->columns, solved);
     const SymbolicFactor& symbolic = c.analysis->symbolic;
     c.sparse_flops = symbolic.flops;
     c.sparse_doubles = symbolic.panel_doubles;

@@ -38,6 +38,8 @@ struct WorkCounts {
   std::uint64_t images = 0, columns = 0, groups = 0, batches = 0, observations = 0;
   std::uint64_t pairs = 0;  ///< of observations of one point: products to form S
   std::uint64_t tiles = 0;  ///< off-diagonal blocks of S; an upper bound above kExactImages
+  std::uint64_t solved_tiles = 0;   ///< of what the rows' blocks hang on; 0: as tiles
+  std::uint64_t solved_blocks = 0;  ///< likewise; 0: as images
   /// Of the sparse factor; where that has not been analysed, upper bounds: those of a dense one.
   double sparse_flops = 0;
   std::uint64_t sparse_doubles = 0;
@@ -68,6 +70,12 @@ WorkCounts count_work(const Batches& batches, const Columns& columns, const Bloc
 /// or, where they are too many to list, none.
 void count_factor(const Columns& columns, const BlockMap* map, const std::vector<Tile>& tiles,
                   WorkCounts& counts);
+
+/// Blocks of the formed matrix, both triangles and the diagonal.
+inline std::uint64_t matrix_blocks(const WorkCounts& c) {
+  return 2 * (c.solved_tiles > 0 ? c.solved_tiles : c.tiles) +
+         (c.solved_blocks > 0 ? c.solved_blocks : c.images);
+}
 
 /// A solver and, in one line, why it was taken.
 struct Plan {

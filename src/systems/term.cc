@@ -9,6 +9,7 @@
 #include "geometry/camera_model.h"
 #include "geometry/motion_log.h"
 #include "scene/terms.h"
+#include "systems/pose_terms.h"
 
 namespace sheaf {
 namespace {
@@ -20,38 +21,6 @@ std::vector<TermPlace> pose_places(const TermPlaces& places, std::uint32_t image
   places.add_pose(image, out);
   return out;
 }
-
-/// U (C - position) with C = -R^T t. exp([rho, phi]^) T moves C by -R^T rho: phi turns about it.
-class CentreTerm : public Term {
- public:
-  CentreTerm(const CentrePrior& prior, const TermPlaces& places)
-      : Term(Part::centres, 3, pose_places(places, prior.image), prior.loss),
-        image_(prior.image),
-        position_(prior.position),
-        U_(*whitening(prior.covariance)) {}
-
-  void evaluate(const CameraState& at, double* r, double* J) const override {
-    const RigidMotion<double>& pose = at.poses[image_];
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    Vector3<double> e;
-    for (std::size_t k = 0; k < 3; ++k) {
-      e[k] = -position_[k];
-      for (std::size_t i = 0; i < 3; ++i) e[k] -= R[3 * i + k] * pose.translation[i];
-    }
-    const Vector3<double> whitened = multiply(U_, e);
-    std::copy(whitened.begin(), whitened.end(), r);
-    if (J == nullptr) return;
-    std::fill_n(J, 18, 0.0);
-    for (std::size_t row = 0; row < 3; ++row)
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t k = 0; k < 3; ++k) J[6 * row + i] -= U_[3 * row + k] * R[3 * i + k];
-  }
-
- private:
-  std::uint32_t image_;
-  std::array<double, 3> position_;
-  std::array<double, 9> U_;
-};
 
 std::vector<TermPlace> kept_places(const TermPlaces& places,
                                    const std::vector<std::uint32_t>& kept) {
@@ -340,8 +309,7 @@ std::vector<std::unique_ptr<Term>> make_terms(const Problem& problem, const Term
   std::vector<std::unique_ptr<Term>> out;
   add_observations(problem, places, kept, skip, view, out);
   const Terms& terms = problem.terms;
-  for (const CentrePrior& of : terms.centres)
-    out.push_back(std::make_unique<CentreTerm>(of, places));
+  add_pose_terms(problem, places, view, out);
   for (const PointPrior& of : terms.points)
     if (std::binary_search(kept.begin(), kept.end(), of.point))
       out.push_back(std::make_unique<KeptPriorTerm>(of, number_of(kept, of.point), places));

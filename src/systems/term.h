@@ -24,7 +24,17 @@ struct TermPlace {
 class Term {
  public:
   /// What a term's cost is told as.
-  enum class Part : std::uint8_t { observations, centres, points, distances, gaussians };
+  enum class Part : std::uint8_t {
+    observations,
+    centres,
+    rotations,
+    gravities,
+    relative_poses,
+    parameters,
+    points,
+    distances,
+    gaussians
+  };
 
   virtual ~Term() = default;
   Part part() const { return part_; }

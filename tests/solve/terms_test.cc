@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/motion_log.h"
 #include "sheaf/solve.h"
 #include "solve/rig_problems.h"
 #include "solve/wide_textbook.h"
@@ -41,6 +42,31 @@ void add_centres(Problem& p, TermLoss loss) {
     for (std::size_t k = 0; k < 3; ++k) C[k] += 0.03 * (k + 1.0) - 0.02 * i;
     p.terms.centres.push_back({i, C, covariance(1e-4), loss});
   }
+}
+/// Positions with lever arms, rotations, gravity, a motion, a focal length and a distortion.
+void add_poses(Problem& p, TermLoss loss) {
+  add_centres(p, loss);
+  p.terms.centres[1].lever_arm = {0.3, -0.2, 0.1};
+  const auto turned = [](const Pose& pose, double by) {
+    return left_perturbed<double>({pose.rotation, pose.translation}, {by, -by, by / 2},
+                                  {0.7 * by, by, -0.4 * by});
+  };
+  p.terms.rotations.push_back({2, turned(p.poses[2], 0.01).rotation, covariance(1e-6), loss});
+  const auto R = matrix_from_quaternion(turned(p.poses[1], 0.02).rotation);
+  p.terms.gravities.push_back({1, {R[1], R[4], R[7]}, {0, 1, 0}, 2e-3, loss});
+  RelativePosePrior motion;
+  motion.first = 0, motion.second = 4, motion.loss = loss;
+  const auto b_from_a = composed(turned(p.poses[4], 0.01),
+                                 inverse<double>({p.poses[0].rotation, p.poses[0].translation}));
+  motion.rotation = b_from_a.rotation, motion.translation = b_from_a.translation;
+  for (std::size_t k = 0; k < 6; ++k)
+    for (std::size_t i = 0; i <= k; ++i)
+      motion.square_root[6 * k + i] = i == k ? 300 : 20.0 - 9 * i;
+  p.terms.relative_poses.push_back(motion);
+}
+void add_parameters(Problem& p, TermLoss loss) {
+  p.terms.parameters.push_back({0, 0, p.cameras[0].parameters[0] + 2, 0.5, loss});
+  p.terms.parameters.push_back({0, 4, p.cameras[0].parameters[4] + 1e-3, 1e-4, loss});
 }
 void add_points(Problem& p) {
   for (const std::uint32_t j : {2u, 7u, 8u, 21u})
@@ -117,16 +143,21 @@ std::vector<Variant> variants() {
     out.push_back({name, std::move(p), std::move(fixed), loss});
   };
   const auto everything = [](Problem& p) {
-    add_centres(p, {}), add_points(p), add_distances(p, {}), add_gaussian(p, {}), add_sigmas(p);
+    add_poses(p, {}), add_parameters(p, {});
+    add_points(p), add_distances(p, {}), add_gaussian(p, {}), add_sigmas(p);
   };
   const auto robust = [](Problem& p) {
-    add_centres(p, {LossKind::cauchy, 2}), add_distances(p, {LossKind::huber, 1});
+    add_poses(p, {LossKind::cauchy, 2}), add_distances(p, {LossKind::huber, 1});
     add_points(p), add_gaussian(p, {LossKind::soft_l1, 3}), add_sigmas(p);
   };
   Fixed points, poses;
   points.points = true, poses.poses = true;
   const CameraModel radial = CameraModel::radial, opencv = CameraModel::opencv;
   with("Centres", unrigged(radial), [](Problem& p) { add_centres(p, {}); });
+  with("Poses", unrigged(radial), [](Problem& p) { add_poses(p, {}); });
+  with("PosesOfLenses", unrigged(opencv), [](Problem& p) { add_poses(p, {}); });
+  with("PosesOnRadialRigs", scene(radial), [](Problem& p) { add_poses(p, {}); });
+  with("Parameters", unrigged(opencv), [](Problem& p) { add_parameters(p, {}); });
   with("Points", unrigged(radial), [](Problem& p) { add_points(p); });
   with("PointsOfLenses", unrigged(opencv), [](Problem& p) { add_points(p); });
   with("Distances", unrigged(radial), [](Problem& p) { add_distances(p, {}); });
@@ -145,7 +176,7 @@ std::vector<Variant> variants() {
   with("PosesHeld", unrigged(opencv), everything, poses);
   return out;
 }
-constexpr int kVariants = 17;
+constexpr int kVariants = 21;
 
 class TermSteps : public testing::TestWithParam<int> {
  protected:
@@ -177,6 +208,7 @@ TEST_P(TermSteps, EndAlikeByEverySolver) {
         if (variant_.loss.kind == LossKind::none) {
           EXPECT_NEAR(evaluate(p).cost, summary.final_plain_cost, 1e-9 * first);
           EXPECT_NEAR(evaluate(p).cost + cost_of_terms(p) / 2, summary.final_cost, 1e-9 * first);
+          EXPECT_NEAR(summary.final_terms.total(), cost_of_terms(p) / 2, 1e-9 * first);
         }
         EXPECT_LT(summary.final_cost, summary.initial_cost);
       }

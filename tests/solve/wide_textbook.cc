@@ -68,9 +68,44 @@ TermRow row_of(const CentrePrior& prior, Variables v) {
   Vector3<D> e;
   for (int k = 0; k < 3; ++k) {
     e[k] = D(-prior.position[k]);
-    for (int i = 0; i < 3; ++i) e[k] = e[k] - R[3 * i + k] * T.translation[i];
+    for (int i = 0; i < 3; ++i)
+      e[k] = e[k] + R[3 * i + k] * (D(prior.lever_arm[i]) - T.translation[i]);
   }
   return {whitened(prior.covariance, e), v.columns, prior.loss};
+}
+
+TermRow row_of(const RotationPrior& prior, Variables v) {
+  const auto& q = prior.rotation;
+  const Quaternion<D> back{D(q[0]), D(-q[1]), D(-q[2]), D(-q[3])};
+  const Vector3<D> phi = angle_axis_from_quaternion(multiply(v.pose(prior.image).rotation, back));
+  return {whitened(prior.covariance, phi), v.columns, prior.loss};
+}
+
+TermRow row_of(const GravityPrior& prior, Variables v) {
+  const Vector3<D> down{prior.down[0], prior.down[1], prior.down[2]};
+  const Vector3<D> measured{prior.measured[0], prior.measured[1], prior.measured[2]};
+  const Matrix3<D> R = matrix_from_quaternion(v.pose(prior.image).rotation);
+  std::vector<D> r;
+  for (const D& e : cross(multiply(R, down), measured)) r.push_back(e / D(prior.sigma_rad));
+  return {r, v.columns, prior.loss};
+}
+
+TermRow row_of(const RelativePosePrior& prior, Variables v) {
+  RigidMotion<D> measured;
+  for (int k = 0; k < 4; ++k) measured.rotation[k] = prior.rotation[k];
+  for (int k = 0; k < 3; ++k) measured.translation[k] = prior.translation[k];
+  const RigidMotion<D> a = v.pose(prior.first), b = v.pose(prior.second);
+  const auto d = log_of(composed(composed(b, inverse(a)), inverse(measured)));
+  std::vector<D> r(6);
+  for (int i = 0; i < 6; ++i)
+    for (int k = 0; k < 6; ++k) r[i] = r[i] + D(prior.square_root[6 * i + k]) * d[k];
+  return {r, v.columns, prior.loss};
+}
+
+TermRow row_of(const ParameterPrior& prior, Variables v) {
+  const D x = v.variable(v.p.cameras[prior.camera].parameters[prior.parameter],
+                         v.at.lens[kMaxCameraParameters * prior.camera + prior.parameter]);
+  return {{(x - D(prior.value)) / D(prior.sigma)}, v.columns, prior.loss};
 }
 
 TermRow row_of(const PointPrior& prior, Variables v) {
@@ -114,6 +149,10 @@ std::vector<TermRow> term_rows(const Problem& p, const Places& at) {
   std::vector<TermRow> out;
   const Variables none{p, at, {}};
   for (const auto& of : p.terms.centres) out.push_back(row_of(of, none));
+  for (const auto& of : p.terms.rotations) out.push_back(row_of(of, none));
+  for (const auto& of : p.terms.gravities) out.push_back(row_of(of, none));
+  for (const auto& of : p.terms.relative_poses) out.push_back(row_of(of, none));
+  for (const auto& of : p.terms.parameters) out.push_back(row_of(of, none));
   for (const auto& of : p.terms.points) out.push_back(row_of(of, none));
   for (const auto& of : p.terms.distances) out.push_back(row_of(of, none));
   for (const auto& of : p.terms.gaussians) out.push_back(row_of(of, none));
