@@ -138,22 +138,9 @@ Verb convert_verb() {
       {F::text(&Arguments::in, problem_in()),
        F::text(&Arguments::out, {.name = "OUT", .placeholder = "FILE", .help = kProblemOut})},
       *a);
-  verb.options =
-      joined({bound<Arguments>({F::name(&Arguments::format,
-                                        {{"bal"},
-                                         {"colmap", "binary"},
-                                         {"colmap-text"},
-                                         {"bundler"},
-                                         {"nvm"},
-                                         {"libmv"},
-                                         {"ply"}},
-                                        {.name = "format",
-                                         .placeholder = "NAME",
-                                         .nothing = true,
-                                         .help = "write this whatever the name, and say what it "
-                                                 "does not hold"})},
-                               *a),
-              bound(clean_fields(), a->clean), options_of(a->rigs), options_of(a->common)});
+  verb.options = joined(
+      {bound<Arguments>({F::name(&Arguments::format, problem_formats(), problem_format())}, *a),
+       bound(clean_fields(), a->clean), options_of(a->rigs), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -11,13 +11,6 @@ namespace {
 
 constexpr double kDegrees = 57.295779513082321;  // of a radian
 
-Json error_json(const ErrorStatistics& e) {
-  return {{"mean", number(e.mean)},
-          {"median", number(e.median)},
-          {"rms", number(e.rms)},
-          {"max", number(e.max)}};
-}
-
 std::string error_line(const char* what, const ErrorStatistics& e, double unit = 1) {
   return fmt::format("{:<22} {:>12.6g} {:>12.6g} {:>12.6g} {:>12.6g}\n", what, unit * e.mean,
                      unit * e.median, unit * e.rms, unit * e.max);
@@ -37,6 +30,13 @@ std::string alignment_text(const StateAlignment& a) {
 
 }  // namespace
 
+Json error_json(const ErrorStatistics& e) {
+  return {{"mean", number(e.mean)},
+          {"median", number(e.median)},
+          {"rms", number(e.rms)},
+          {"max", number(e.max)}};
+}
+
 Json errors_json(const StateErrors& errors) {
   const auto of_rigs = [&](const ErrorStatistics& e) {
     return errors.has_rigs ? error_json(e) : Json();
@@ -46,7 +46,7 @@ Json errors_json(const StateErrors& errors) {
           {"rotation_error_rad", error_json(errors.rotation_error_rad)},
           {"translation_error", error_json(errors.translation_error)},
           {"center_error", error_json(errors.center_error)},
-          {"point_error", error_json(errors.point_error)},
+          {"point_error", errors.has_points ? error_json(errors.point_error) : Json()},
           {"frame_rotation_error_rad", of_rigs(errors.frame_rotation_error_rad)},
           {"frame_center_error", of_rigs(errors.frame_center_error)},
           {"sensor_rotation_error_rad", of_rigs(errors.sensor_rotation_error_rad)},
@@ -56,8 +56,9 @@ Json errors_json(const StateErrors& errors) {
 std::string errors_csv(const ErrorLists& lists) {
   std::string out = "image,rotation_error_rad,rotation_error_deg,translation_error,center_error\n";
   for (std::size_t j = 0; j < lists.rotation_rad.size(); ++j)
-    out += fmt::format("{},{},{},{},{}\n", j, lists.rotation_rad[j],
-                       kDegrees * lists.rotation_rad[j], lists.translation[j], lists.center[j]);
+    out +=
+        fmt::format("{},{},{},{},{}\n", lists.matching.images[j].reference, lists.rotation_rad[j],
+                    kDegrees * lists.rotation_rad[j], lists.translation[j], lists.center[j]);
   return out;
 }
 
@@ -73,7 +74,7 @@ std::string errors_text(const ErrorLists& lists) {
   out += error_line("rotation (deg)", errors.rotation_error_rad, kDegrees);
   out += error_line("translation (of t)", errors.translation_error);
   out += error_line("camera centre", errors.center_error);
-  out += error_line("point", errors.point_error);
+  if (errors.has_points) out += error_line("point", errors.point_error);
   if (!errors.has_rigs) return out;
   out += error_line("frame rotation (rad)", errors.frame_rotation_error_rad);
   out += error_line("frame centre", errors.frame_center_error);

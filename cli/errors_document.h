@@ -9,10 +9,14 @@
 
 namespace sheaf {
 
+/// mean, median, rms, max.
+Json error_json(const ErrorStatistics& errors);
+
 /// aligned, scale, rotation_error_rad, translation_error, center_error, point_error.
 Json errors_json(const StateErrors& errors);
 
-/// One line for each image: its errors. Needs no locale, every digit of the double.
+/// One line for each common image, by its number in the reference: its errors. Needs no locale,
+/// every digit of the double.
 std::string errors_csv(const ErrorLists& lists);
 
 /// "Mean rot error" and "Mean trans error", then a table of all.

@@ -10,6 +10,7 @@
 #include "interrupt.h"
 #include "io/output_file.h"
 #include "json_document.h"
+#include "matching_document.h"
 #include "outputs.h"
 #include "report/errors.h"
 #include "sheaf/sheaf.h"
@@ -59,12 +60,17 @@ int run(const Arguments& arguments) {
                stderr);
   interrupt.begin_write();
   if (!arguments.csv.empty()) write_csv(lists, arguments.csv);
-  fmt::print("{} against {}: {}\n{}", arguments.estimate, arguments.reference,
-             counts_text(estimate.problem), errors_text(lists));
+  fmt::print(
+      "{} against {}: {}\n{}{}", arguments.estimate, arguments.reference,
+      counts_text(estimate.problem),
+      matching_text(lists.matching, estimate.problem, reference.problem, "estimate", "reference"),
+      errors_text(lists));
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION},
                    {"estimate", input_json(arguments.estimate, estimate)},
-                   {"reference", input_json(arguments.reference, reference)}};
+                   {"reference", input_json(arguments.reference, reference)},
+                   {"common", matching_json(lists.matching, estimate.problem, reference.problem,
+                                            "estimate", "reference")}};
   document.update(errors_json(summarise(lists)));
   document["alignment"] = alignment_json(lists.alignment);
   document["time"] = {{"read_s", estimate.read_s + reference.read_s}, {"total_s", total.seconds()}};
@@ -88,7 +94,7 @@ Verb evaluate_verb() {
        F::text(&Arguments::reference,
                {.name = "REF",
                 .placeholder = "FILE",
-                .help = "reference with the same images and points; lengths are in its units"})},
+                .help = "reference; what both have is compared, and lengths are in its units"})},
       *a);
   verb.options = joined(
       {bound<Arguments>(

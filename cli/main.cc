@@ -7,5 +7,5 @@ int main(int argc, char** argv) {
   return run_command_line(
       argc, argv,
       {solve_verb(), info_verb(), check_verb(), convert_verb(), perturb_verb(), evaluate_verb(),
-       compare_verb(), photometric_verb(), generate_verb(), demo_verb()});
+       align_verb(), compare_verb(), photometric_verb(), generate_verb(), demo_verb()});
 }

@@ -45,4 +45,15 @@ OptionSpec problem_in() {
               "of a COLMAP model (told by content)"};
 }
 
+OptionSpec problem_format() {
+  return {.name = "format",
+          .placeholder = "NAME",
+          .nothing = true,
+          .help = "write this whatever the name, and say what it does not hold"};
+}
+
+std::vector<OptionChoice> problem_formats() {
+  return {{"bal"}, {"colmap", "binary"}, {"colmap-text"}, {"bundler"}, {"nvm"}, {"libmv"}, {"ply"}};
+}
+
 }  // namespace sheaf

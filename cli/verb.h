@@ -26,6 +26,7 @@ Verb check_verb();
 Verb convert_verb();
 Verb perturb_verb();
 Verb evaluate_verb();
+Verb align_verb();
 Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();
@@ -49,6 +50,9 @@ std::vector<BoundOption> own(const std::vector<BoundOption>& options);
 OptionSpec problem_in();
 /// --ply of two states of a problem.
 OptionSpec ply_of_two_states();
+/// --format of a problem that is written, and what it takes.
+OptionSpec problem_format();
+std::vector<OptionChoice> problem_formats();
 /// What a problem that is written becomes, for --help.
 inline constexpr const char* kProblemOut =
     "NAME.ply is a point cloud with cameras, NAME.out Bundler, NAME.nvm NVM, NAME.problem libmv, a "

@@ -31,14 +31,8 @@ Vector3<double> mean_of(const std::vector<Vector3<double>>& points,
 
 }  // namespace
 
-Vector3<double> Similarity::operator()(const Vector3<double>& X) const {
-  Vector3<double> out = multiply(matrix_from_quaternion(rotation), X);
-  for (int k = 0; k < 3; ++k) out[k] = scale * out[k] + translation[k];
-  return out;
-}
-
 Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
-                const std::vector<double>& weights) {
+                const std::vector<double>& weights, AlignScale scale) {
   if (from.empty()) return {};
   const Vector3<double> a = mean_of(from, weights), b = mean_of(to, weights);
   Matrix3<double> S{};  // sum of w (from - a) (to - b)^T
@@ -55,10 +49,24 @@ Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vect
   Similarity out;
   out.rotation = best.rotation;
   // At the optimum s = trace(R S) / sum |from - a|^2.
-  if (from_square > 0) out.scale = best.trace / from_square;
+  if (scale == AlignScale::free && from_square > 0) out.scale = best.trace / from_square;
   const Vector3<double> moved = out(a);
   for (int k = 0; k < 3; ++k) out.translation[k] = b[k] - moved[k];
   return {out, best.certainty};
+}
+
+std::vector<Vector3<double>> camera_centers(const Problem& problem) {
+  std::vector<Vector3<double>> out;
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const Pose pose = pose_of(problem, j);
+    const Quaternion<double>& q = pose.rotation;
+    Vector3<double> c =
+        multiply(matrix_from_quaternion(Quaternion<double>{q[0], -q[1], -q[2], -q[3]}),
+                 Vector3<double>(pose.translation));
+    for (double& x : c) x = -x;
+    out.push_back(c);
+  }
+  return out;
 }
 
 }  // namespace sheaf

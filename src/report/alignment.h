@@ -2,22 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
 #include "geometry/rotation.h"
+#include "scene/similarity.h"
+#include "sheaf/problem.h"
 
 namespace sheaf {
-
-/// Sim(3): X -> s R X + t.
-struct Similarity {
-  double scale = 1;
-  Quaternion<double> rotation{1, 0, 0, 0};
-  Vector3<double> translation{0, 0, 0};
-
-  Vector3<double> operator()(const Vector3<double>& X) const;
-};
 
 struct Alignment {
   Similarity similarity;
@@ -26,11 +18,14 @@ struct Alignment {
   double certainty = 0;
 };
 
+/// Whether the scale of an alignment is sought, or is 1: then it is a rigid motion.
+enum class AlignScale { free, one };
+
 /// The similarity that minimises sum w_i |to_i - S(from_i)|^2 (Horn 1987: the rotation is the
-/// largest eigenvector of a symmetric 4x4 matrix); without weights each is 1. The scale is 1 where
-/// `from` is a single place.
+/// largest eigenvector of a symmetric 4x4 matrix, whatever the scale); without weights each is 1.
+/// The scale is 1 where `from` is a single place.
 Alignment align(const std::vector<Vector3<double>>& from, const std::vector<Vector3<double>>& to,
-                const std::vector<double>& weights = {});
+                const std::vector<double>& weights = {}, AlignScale scale = AlignScale::free);
 
 /// The same, not led astray where almost half the places are wrong: of the similarities through
 /// three places each (chosen by a fixed seed) the one of least median distance, then weights
@@ -41,6 +36,10 @@ struct RobustAlignment {
   std::size_t inliers = 0;
 };
 RobustAlignment align_robustly(const std::vector<Vector3<double>>& from,
-                               const std::vector<Vector3<double>>& to);
+                               const std::vector<Vector3<double>>& to,
+                               AlignScale scale = AlignScale::free);
+
+/// -R^T t of each image: where its camera is in the world.
+std::vector<Vector3<double>> camera_centers(const Problem& problem);
 
 }  // namespace sheaf

@@ -4,10 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <optional>
-#include <string>
-#include <unordered_map>
 #include <utility>
 
 #include "geometry/rotation.h"
@@ -22,18 +18,6 @@ Quaternion<double> conjugate(const Quaternion<double>& q) { return {q[0], -q[1],
 double distance(const Vector3<double>& a, const Vector3<double>& b) {
   const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
   return std::sqrt(x * x + y * y + z * z);
-}
-
-std::vector<Vector3<double>> centers_of(const Problem& problem) {
-  std::vector<Vector3<double>> out;
-  for (std::size_t j = 0; j < problem.num_images(); ++j) {
-    const Pose pose = pose_of(problem, j);
-    Vector3<double> c = multiply(matrix_from_quaternion(conjugate(pose.rotation)),
-                                 Vector3<double>(pose.translation));
-    for (double& x : c) x = -x;
-    out.push_back(c);
-  }
-  return out;
 }
 
 std::vector<Vector3<double>> points_of(const Problem& problem) {
@@ -72,7 +56,7 @@ StateAlignment alignment_between(const Problem& estimate, const Problem& referen
                                  AlignBy align_by) {
   if (align_by == AlignBy::nothing) return {};
   const StateAlignment by_centers =
-      alignment_of(centers_of(estimate), centers_of(reference), align_by, kCertain);
+      alignment_of(camera_centers(estimate), camera_centers(reference), align_by, kCertain);
   if (by_centers.aligned) return by_centers;
   StateAlignment by_points =
       alignment_of(points_of(estimate), points_of(reference), align_by, 1e-6);
@@ -92,77 +76,22 @@ ErrorStatistics statistics_of_errors(std::vector<double> values) {
           std::sqrt(squares / static_cast<double>(n)), values.back()};
 }
 
-namespace {
-
-/// For each entry of the reference its place in the estimate, by a name that both state; as they
-/// come where one of them states none. Nothing where the estimate lacks one.
-template <class Name>
-std::optional<std::vector<std::size_t>> places_of(const std::vector<Name>& reference,
-                                                  const std::vector<Name>& estimate,
-                                                  std::size_t count) {
-  std::vector<std::size_t> places(count);
-  std::iota(places.begin(), places.end(), 0);
-  if (reference.size() != count || estimate.size() != count || reference == estimate) return places;
-  std::unordered_map<Name, std::size_t> place;
-  for (std::size_t i = 0; i < count; ++i) place[estimate[i]] = i;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto found = place.find(reference[i]);
-    if (found == place.end()) return {};
-    places[i] = found->second;
-  }
-  return places;
-}
-
-/// Poses, lenses and points in the reference's order.
-Result<Problem> in_order_of(const Problem& reference, const Problem& estimate) {
-  const auto images = places_of(reference.metadata->image_names, estimate.metadata->image_names,
-                                reference.num_images());
-  const auto points = places_of(reference.metadata->point_ids, estimate.metadata->point_ids,
-                                reference.num_points());
-  if (!images || !points)
-    return Error(ErrorCode::usage, std::string("the estimate has no ") +
-                                       (images ? "point of an id" : "image of a name") +
-                                       " that the reference has");
-  Problem ordered;
-  ordered.cameras = estimate.cameras;
-  for (const std::size_t j : *images)
-    ordered.add_image(estimate.poses[j], estimate.image_camera[j]);
-  ordered.rigs = estimate.rigs;
-  if (!ordered.rigs.empty())
-    for (std::size_t k = 0; k < images->size(); ++k) {
-      ordered.rigs.image_frame[k] = estimate.rigs.image_frame[(*images)[k]];
-      ordered.rigs.image_sensor[k] = estimate.rigs.image_sensor[(*images)[k]];
-    }
-  for (const std::size_t p : *points)
-    ordered.add_point(estimate.points[3 * p], estimate.points[3 * p + 1],
-                      estimate.points[3 * p + 2]);
-  return ordered;
-}
-
-}  // namespace
-
-Result<ErrorLists> list_errors(const Problem& given, const Problem& reference, AlignBy align_by) {
-  Problem ordered;
-  const bool named = given.metadata && reference.metadata &&
-                     given.num_images() == reference.num_images() &&
-                     given.num_points() == reference.num_points();
-  if (named) {
-    Result<Problem> in_order = in_order_of(reference, given);
-    if (!in_order.ok()) return in_order.error();
-    ordered = std::move(in_order).value();
-  }
-  const Problem& estimate = named ? ordered : given;
-  if (estimate.num_images() != reference.num_images() ||
-      estimate.num_points() != reference.num_points())
-    return Error(ErrorCode::usage, "the estimate has " + std::to_string(estimate.num_images()) +
-                                       " images and " + std::to_string(estimate.num_points()) +
-                                       " points, the reference " +
-                                       std::to_string(reference.num_images()) + " and " +
-                                       std::to_string(reference.num_points()));
+Result<ErrorLists> list_errors(const Problem& all_of_estimate, const Problem& all_of_reference,
+                               AlignBy align_by) {
+  Result<Matching> matched = match_models(all_of_estimate, all_of_reference);
+  if (!matched.ok()) return matched.error();
   ErrorLists out;
+  out.matching = std::move(matched).value();
+  Problem parts[2];
+  if (!out.matching.in_order) {
+    parts[0] = common_of_estimate(all_of_estimate, out.matching);
+    parts[1] = common_of_reference(all_of_reference, out.matching);
+  }
+  const Problem& estimate = out.matching.in_order ? all_of_estimate : parts[0];
+  const Problem& reference = out.matching.in_order ? all_of_reference : parts[1];
   out.alignment = alignment_between(estimate, reference, align_by);
   const Similarity& similarity = out.alignment.similarity;
-  const auto centers = centers_of(estimate), reference_centers = centers_of(reference);
+  const auto centers = camera_centers(estimate), reference_centers = camera_centers(reference);
   for (std::size_t j = 0; j < estimate.num_images(); ++j) {
     const Pose want = pose_of(reference, j);
     Pose have = pose_of(estimate, j);
@@ -194,6 +123,7 @@ StateErrors summarise(const ErrorLists& lists) {
           statistics_of_errors(lists.translation),
           statistics_of_errors(lists.center),
           statistics_of_errors(lists.point),
+          lists.matching.has_points,
           !lists.rigs.frame_center.empty(),
           statistics_of_errors(lists.rigs.frame_rotation_rad),
           statistics_of_errors(lists.rigs.frame_center),

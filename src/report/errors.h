@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "report/alignment.h"
+#include "report/matching.h"
 #include "sheaf/error.h"
 #include "sheaf/problem.h"
 
@@ -45,20 +46,19 @@ struct RigErrorLists {
 };
 
 /// Each error: a rotation's angle in radians, |t - t_reference|, distances of camera centres and
-/// points. Scene units are the reference's.
+/// points. Scene units are the reference's. Lists are in the order of `matching`.
 struct ErrorLists {
+  Matching matching;
   StateAlignment alignment;
-  std::vector<double> rotation_rad, translation, center;  ///< one for each image
-  std::vector<double> point;
+  std::vector<double> rotation_rad, translation, center;  ///< one for each common image
+  std::vector<double> point;                              ///< one for each common point
   RigErrorLists rigs;
 };
 
-/// Images and points are told by their names and ids where both problems state them, and then lists
-/// are in the reference's order; else by their order. Errors: ErrorCode::usage when counts or names
-/// differ.
+/// Of what the two have in common, by `match_models`; its errors.
 Result<ErrorLists> list_errors(const Problem& estimate, const Problem& reference, AlignBy align);
 
-/// How far an estimate is from a reference with the same images and points.
+/// How far an estimate is from a reference.
 struct StateErrors {
   bool aligned = false;
   double scale = 1;  ///< of the Sim(3)
@@ -66,7 +66,8 @@ struct StateErrors {
   ErrorStatistics translation_error;
   ErrorStatistics center_error;
   ErrorStatistics point_error;
-  bool has_rigs = false;  ///< whether there is something to compare in the next four
+  bool has_points = true;  ///< whether it is known which points are the same
+  bool has_rigs = false;   ///< whether there is something to compare in the next four
   ErrorStatistics frame_rotation_error_rad;
   ErrorStatistics frame_center_error;
   ErrorStatistics sensor_rotation_error_rad;

@@ -43,8 +43,8 @@ Places thinned(const Places& places) {
 }
 
 // The start: of all places together and of triples, what leaves the least median distance.
-Alignment best_start(const Places& from, const Places& to) {
-  Alignment best = align(from, to);
+Alignment best_start(const Places& from, const Places& to, AlignScale scale) {
+  Alignment best = align(from, to, {}, scale);
   double least = median_of(distances(best.similarity, from, to));
   Random random(1);
   for (int trial = 0; trial < kTriples; ++trial) {
@@ -54,7 +54,7 @@ Alignment best_start(const Places& from, const Places& to) {
       a.push_back(from[i]);
       b.push_back(to[i]);
     }
-    const Alignment candidate = align(a, b);
+    const Alignment candidate = align(a, b, {}, scale);
     if (!(candidate.certainty > 1e-3) || !std::isfinite(candidate.similarity.scale)) continue;
     const double median = median_of(distances(candidate.similarity, from, to));
     if (median < least) {
@@ -67,10 +67,10 @@ Alignment best_start(const Places& from, const Places& to) {
 
 }  // namespace
 
-RobustAlignment align_robustly(const Places& from, const Places& to) {
+RobustAlignment align_robustly(const Places& from, const Places& to, AlignScale scale) {
   RobustAlignment out;
   if (from.empty()) return out;
-  out.alignment = best_start(thinned(from), thinned(to));
+  out.alignment = best_start(thinned(from), thinned(to), scale);
   // The median of a normal error's length in three dimensions is 1.538 sigma.
   constexpr double kSigmaOfMedian = 1 / 1.538, kCauchy = 2.385;
   std::vector<double> weights(from.size());
@@ -84,7 +84,7 @@ RobustAlignment align_robustly(const Places& from, const Places& to) {
     // The median at rounding means that half the places agree exactly: nothing is left to weigh.
     if (!(s > 0) || std::fabs(s - before) <= 1e-12 * s) break;
     for (std::size_t i = 0; i < d.size(); ++i) weights[i] = 1 / (1 + (d[i] / s) * (d[i] / s));
-    out.alignment = align(from, to, weights);
+    out.alignment = align(from, to, weights, scale);
   }
   return out;
 }

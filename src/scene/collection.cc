@@ -163,17 +163,17 @@ std::vector<std::uint32_t> curve_order(const std::vector<Target>& targets,
 
 // Each spot was put together by itself and joined to its parent: errors add up along the tree. They
 // fade over some spots, as where branches meet and are joined once more.
-std::vector<Similarity> join(const std::vector<Spot>& spots, double size, Random& random) {
+std::vector<Drift> join(const std::vector<Spot>& spots, double size, Random& random) {
   constexpr double kKept = 0.85;
-  std::vector<Similarity> drifts(spots.size());
+  std::vector<Drift> drifts(spots.size());
   for (std::size_t k = 0; k < spots.size(); ++k) {
-    const Similarity& parent = drifts[spots[k].parent];
+    const Drift& parent = drifts[spots[k].parent];
     const Vector3<double> position = {spots[k].x, spots[k].y, 0};
     const Vector3<double> carried = parent(position);
     Vector3<double> turn = portable_angle_axis(parent.turn);
     const Vector3<double> own_turn = normal3(random, 0.003 * size);
     const Vector3<double> move = normal3(random, 0.004 * size);
-    Similarity drift;
+    Drift drift;
     drift.from = position;
     for (int i = 0; i < 3; ++i) {
       drift.to[i] = position[i] + kKept * (carried[i] - position[i]) + move[i];

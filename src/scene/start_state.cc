@@ -55,7 +55,7 @@ std::vector<ViewState> start_states(const Layout& layout, const FamilyOptions& o
   std::vector<ViewState> states(layout.views.size());
   for (const View& view : layout.views) {
     Random random(options.seed, kImageStream + view.file_index);
-    const Similarity& drift = layout.drifts[view.group];
+    const Drift& drift = layout.drifts[view.group];
     Vector3<double> center = drift(view.center);
     // Most images are placed well, some badly.
     const double place = size * growth(std::clamp(0.8 * random.normal() - 0.6, -3.0, 1.2));
@@ -82,7 +82,7 @@ Vector3<double> start_point(const Layout& layout, const FamilyOptions& options, 
   if (options.drift == 0) return track.X;
   Random random(options.seed, kPointStream + i);
   const View& seed = layout.views[track.seed_view];
-  const Similarity& drift = layout.drifts[seed.group];
+  const Drift& drift = layout.drifts[seed.group];
   const double angle = parallax(layout, track);
   double stretch = options.drift * 1.0 * random.normal() / (seed.intrinsics[0] * angle);
   // A street's most distant points may come out behind the car.

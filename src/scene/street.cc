@@ -110,8 +110,8 @@ View make_view(const std::vector<Edge>& path, std::uint32_t i, double lane, doub
 
 // Errors as a chain of relative measurements leaves them: rotation and scale wander, and positions
 // add up what they did. They return to zero over some thousand images, as after loops closed.
-std::vector<Similarity> wander(const std::vector<View>& views, double size, Random& random) {
-  std::vector<Similarity> drifts(views.size());
+std::vector<Drift> wander(const std::vector<View>& views, double size, Random& random) {
+  std::vector<Drift> drifts(views.size());
   constexpr double kReturn = 1 - 1.0 / 2000;
   Vector3<double> turn{0, 0, 0};
   double scale = 0;
@@ -119,12 +119,12 @@ std::vector<Similarity> wander(const std::vector<View>& views, double size, Rand
     const Vector3<double> step = normal3(random, 1.2e-4 * size);
     for (int k = 0; k < 3; ++k) turn[k] = kReturn * turn[k] + step[k];
     scale = kReturn * scale + 3e-4 * size * random.normal();
-    Similarity& drift = drifts[i];
+    Drift& drift = drifts[i];
     drift.turn = portable_quaternion(turn);
     drift.scale = 1 + std::max(scale, -0.5);
     drift.from = drift.to = views[i].center;
     if (i == 0) continue;
-    Similarity last = drifts[i - 1];
+    Drift last = drifts[i - 1];
     last.turn = drift.turn;
     last.scale = drift.scale;
     drift.to = last(views[i].center);

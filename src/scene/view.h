@@ -15,7 +15,7 @@ namespace sheaf {
 class Random;
 
 /// X -> to + scale R(turn) (X - from).
-struct Similarity {
+struct Drift {
   Quaternion<double> turn{1, 0, 0, 0};
   double scale = 1;
   Vector3<double> from{0, 0, 0}, to{0, 0, 0};
@@ -51,7 +51,7 @@ struct Layout {
   std::vector<std::uint32_t> second_order, second_rank;
   /// Street: the image at the same place the next time the car comes by, in a ring, or itself.
   std::vector<std::uint32_t> revisit;
-  std::vector<Similarity> drifts;  ///< start from truth, one for each group
+  std::vector<Drift> drifts;  ///< start from truth, one for each group
 };
 
 Layout make_street(const FamilyOptions& options);

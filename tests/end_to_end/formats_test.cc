@@ -88,7 +88,14 @@ TEST_F(FormatsCommand, EvaluatesModelsInAnyOrder) {
   EXPECT_EQ(json_of(folder_ / "e.json")["point_error"]["max"], 0);
   metadata->image_names[0] = "another";
   write(other, folder_ / "other", {.format = "colmap"}).value();
-  EXPECT_EQ(run({"evaluate", "other", "model"}).exit_code, 2);
+  const Outcome others = run({"evaluate", "other", "model", "--no-align", "--json", "e.json"});
+  ASSERT_EQ(others.exit_code, 0) << others.err;
+  EXPECT_NE(others.out.find("only the estimate has: another"), std::string::npos) << others.out;
+  const auto common = json_of(folder_ / "e.json")["common"];
+  EXPECT_EQ(common["images"], 7);
+  EXPECT_EQ(common["images_only_in_estimate"]["first"][0], "another");
+  EXPECT_EQ(json_of(folder_ / "e.json")["center_error"]["max"], 0);
+  EXPECT_TRUE(json_of(folder_ / "e.json")["point_error"].is_null()) << "it has no features";
 }
 
 TEST_F(FormatsCommand, PerturbsAndComparesModels) {

@@ -93,6 +93,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
                     "--min-track"});
+  if (verb == "align")
+    options.insert({"--output", "--reference", "--rigid", "--least-squares", "--format"});
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",
@@ -156,15 +158,15 @@ TEST_P(Help, ExampleRuns) {
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
-                                         "photometric", "generate", "demo"),
+                                         "align", "photometric", "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "compare",
-                           "photometric", "generate", "demo"})
+  for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "align",
+                           "compare", "photometric", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

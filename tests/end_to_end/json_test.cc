@@ -170,6 +170,13 @@ TEST_F(JsonTest, EvaluateHasTheDocumentedKeys) {
   EXPECT_TRUE(is_errors(json_of(folder_ / "evaluate.json"), true));
 }
 
+TEST_F(JsonTest, AlignHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"align", "in.txt", "-o", "o.txt", "--reference", "in.txt", "--json", "align.json"})
+                .exit_code,
+            0);
+  expect_documented("align", {kShared, "align"});
+}
+
 TEST_F(JsonTest, CompareHasTheDocumentedKeys) {
   ASSERT_EQ(run({"compare", "in.txt", "--json", "compare.json", "--solvers", "sheaf,nobody",
                  "--reference", "in.txt"})
