@@ -165,7 +165,8 @@ class TableReading {
     std::vector<std::string> names;
     while (lines_.next_line()) {
       names = fields_of(lines_.rest());
-      if (names.size() >= 4) break;
+      const auto labels = [](const std::string& field) { return column_named(field) == kLabel; };
+      if (std::any_of(names.begin(), names.end(), labels)) break;
     }
     for (std::size_t i = 0; i < names.size(); ++i)
       if (const auto column = column_named(names[i]); column && place_[*column] < 0)
