@@ -20,13 +20,6 @@ SolveOptions tight() {
   return options;
 }
 
-std::set<std::string> blunders(const std::vector<SurveyResidual>& list) {
-  std::set<std::string> out;
-  for (const SurveyResidual& r : list)
-    if (r.blunder) out.insert(r.name);
-  return out;
-}
-
 TEST(SurveyPlace, PositionsOffBy50DoNotBendTheModelAndAreNamed) {
   const SurveyScene made;
   Constraints c = made.frame();
@@ -40,13 +33,18 @@ TEST(SurveyPlace, PositionsOffBy50DoNotBendTheModelAndAreNamed) {
   ASSERT_EQ(survey.outliers.size(), 2u);
   solve(problem, tight());
   const SurveyReport report = finish_survey(problem, survey);
-  EXPECT_EQ(blunders(report.positions), (std::set{made.name(3), made.name(20)}));
   ASSERT_EQ(report.positions.size(), 40u);
+  // Right ones have three normal errors each, so that now and then one is named too.
+  EXPECT_EQ((std::set{report.positions[0].name, report.positions[1].name}),
+            (std::set{made.name(3), made.name(20)}));
+  EXPECT_GT(report.positions[1].worst_sigmas, 50);
+  EXPECT_LT(report.positions[2].worst_sigmas, 5);
   for (const SurveyResidual& r : report.positions)
-    for (std::size_t j = 0; j < 40; ++j)
-      if (made.name(j) == r.name)
-        for (std::size_t k = 0; k < 3; ++k)
-          EXPECT_NEAR(r.adjusted[k], made.true_centre(j)[k], 0.5) << r.name;
+    for (std::size_t j = 0; j < 40; ++j) {
+      if (made.name(j) != r.name) continue;
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(r.adjusted[k], made.true_centre(j)[k], 0.5) << r.name;
+    }
   // What the survey added is gone again.
   EXPECT_EQ(problem.num_points(), made.scene.start.num_points());
   EXPECT_EQ(problem.metadata, made.scene.start.metadata);
@@ -87,7 +85,7 @@ TEST(SurveyPlace, FarAwayAndNearTheOriginEndAtTheSameCost) {
     made.add_points(6, SurveyRole::control, 0.02, 5, c);
     Problem problem = made.scene.start;
     const Survey survey = place_survey(problem, c).value();
-    if (is_far) EXPECT_NEAR(survey.frame.origin->at(1), 4650000, 200);
+    EXPECT_NEAR(survey.frame.origin->at(1), made.far[1], 200);
     costs[is_far] = solve(problem, tight()).final_cost;
   }
   EXPECT_NEAR(costs[0], costs[1], 1e-9 * costs[0]);

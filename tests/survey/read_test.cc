@@ -47,7 +47,7 @@ TEST(SurveyRead, BadSurveysAreToldWithFileAndLine) {
        "s.json:2: found a scale bar at point '1', expected the id of one of the points"},
       {"{\"positions\": [\n{\"image\": \"a\", \"xyz\": [1, 2, 3]}]}",
        "s.json:2: found no \"sigma\", expected one in this object"},
-      {"EPSG:32633\n1 2 3 4 5\n1 2 x 4 5 a.jpg\n", "s.json:2: "},
+      {"EPSG:32633\n1 2 3 4 5\n1 2 x 4 5 a.jpg\n", "s.json:3: found 'x'"},
       {"some grid\na.jpg 1 2 3\n", "s.json:1: found 'some grid', expected the frame"},
       {"EPSG:32633\na.jpg 1 2 3 0 0 0 0 1\n", "s.json:2: found '1', expected a horizontal and"},
       {"label,x,y,z\na,1,2,3\n", "s.json:1: found no accuracies"},
