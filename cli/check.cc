@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "constraints_option.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "sheaf/sheaf.h"
@@ -22,6 +24,7 @@ constexpr const char* kObservations = "observations";
 
 struct Arguments {
   CommonOptions common;
+  ConstraintsArguments constraints;
   std::string in;
 };
 
@@ -63,12 +66,17 @@ int run(const Arguments& arguments) {
     fmt::print("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
                places_text(finding, input.problem));
   if (findings.empty()) fmt::print("nothing that looks wrong\n");
+  // On a copy: a survey moves the problem, whose findings are of the file.
+  Problem placed = arguments.constraints.path.empty() ? Problem() : input.problem;
+  const std::optional<Survey> survey = place_survey(arguments.constraints, placed, {});
+  if (survey) fmt::print("{}", survey_text(*survey));
   if (json.empty()) return 0;
   Json list = Json::array();
   for (const Finding& finding : findings) list.push_back(finding_json(finding, input.problem));
   write_json({{"version", SHEAF_VERSION},
               {"input", input_json(arguments.in, input)},
               {"findings", list},
+              {"survey", survey_json(survey, nullptr)},
               {"time", {{"read_s", input.read_s}, {"total_s", total.seconds()}}}},
              json);
   return 0;
@@ -81,7 +89,7 @@ Verb check_verb() {
   Verb verb{"check", "what is wrong with a problem, and what to do",
             "Example:\n  sheaf check problem.txt --json check.json"};
   verb.places = bound<Arguments>({FieldsOf<Arguments>::text(&Arguments::in, problem_in())}, *a);
-  verb.options = options_of(a->common);
+  verb.options = joined({options_of(a->constraints, false), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

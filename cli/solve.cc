@@ -5,13 +5,17 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "constraints_option.h"
 #include "exit_code.h"
 #include "interrupt.h"
+#include "io/output_file.h"
 #include "json_document.h"
 #include "options/solve_options.h"
 #include "outputs.h"
@@ -30,6 +34,7 @@ struct Arguments {
   CommonOptions common;
   SolveArguments solve;
   RigsArguments rigs;
+  ConstraintsArguments constraints;
   std::string in, out, ply;
 };
 
@@ -51,15 +56,47 @@ std::string hold(const RefinementArguments& arguments, const Problem& problem, F
   return fmt::format("held        {}\n", held_text(refinement, problem));
 }
 
+// A survey that takes part: placed before the solve, measured after it.
+struct SurveyWork {
+  std::optional<Survey> survey{};
+  SurveyReport report{};
+};
+
+// Points of the survey leave the problem, and the summary what it says of their marks.
+void finish(SurveyWork& work, Problem& problem, Summary& summary) {
+  if (!work.survey) return;
+  work.report = finish_survey(problem, *work.survey);
+  const std::uint64_t own = problem.num_observations();
+  for (auto* list : {&summary.behind_camera_before, &summary.behind_camera_after,
+                     &summary.rejected_observations})
+    std::erase_if(*list, [own](std::uint64_t i) { return i >= own; });
+}
+
+void write_text(const std::string& text, const std::string& path) {
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(text);
+  file.value().commit().value();
+}
+
 // The best state found, and what was written.
-std::vector<std::string> write_results(const Arguments& arguments, Problem before,
-                                       const Problem& after) {
+std::vector<std::string> write_results(const Arguments& arguments, const SurveyWork& work,
+                                       Problem before, const Problem& after) {
   std::vector<std::string> written;
   if (!arguments.out.empty()) {
     write(after, arguments.out).value();
     written.push_back(arguments.out);
+    if (work.survey && write_format(after, arguments.out).starts_with("colmap")) {
+      written.push_back((std::filesystem::path(arguments.out) / "frame.json").string());
+      write_json(frame_json(*work.survey), written.back());
+    }
+  }
+  if (!arguments.constraints.residuals.empty()) {
+    write_text(residuals_csv(work.report), arguments.constraints.residuals);
+    written.push_back(arguments.constraints.residuals);
   }
   if (!arguments.ply.empty()) {
+    before.points.resize(after.points.size());
     before.observation_image = after.observation_image;
     before.observation_point = after.observation_point;
     before.observation_xy = after.observation_xy;
@@ -88,12 +125,43 @@ bool agrees(const Summary& summary, const Evaluation& after, const Problem& prob
   return std::abs(cost - summary.final_plain_cost) <= kRounding * (cost + 1e-20);
 }
 
+SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt,
+                         Progress& progress) {
+  SolveOptions options = arguments.solve.options;
+  options.threads = arguments.common.threads;
+  options.lend_observations = true;
+  options.stop = interrupt.token();
+  options.on_plan = [&](const Summary& summary) { progress.report_plan(summary); };
+  options.on_iteration = [&](const Iteration& iteration) {
+    progress.report(iteration);
+    return true;
+  };
+  return options;
+}
+
+// What is said once all is written.
+void say(const Arguments& arguments, const InputFile& input, const SolveRecord& record,
+         const SurveyWork& work, const Summary& summary, const std::string& held) {
+  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
+  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
+  if (work.survey) fmt::print("{}", survey_text(*work.survey));
+  fmt::print("{}", summary_text(summary, input.read_s));
+  fmt::print("{}", residuals_text(work.report));
+  fmt::print("{}", held);
+  if (!record.agrees)
+    fmt::print(
+        "wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
+        record.after.cost, summary.final_plain_cost);
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const bool wants_json = !arguments.common.json.empty();
-  check_outputs(
-      {{"-o", arguments.out, true}, {"--json", arguments.common.json}, {"--ply", arguments.ply}});
+  check_outputs({{"-o", arguments.out, true},
+                 {"--json", arguments.common.json},
+                 {"--ply", arguments.ply},
+                 {"--residuals", arguments.constraints.residuals}});
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
 
@@ -103,42 +171,32 @@ int run(Arguments& arguments) {
   if (wants_json) record.input = input_json(arguments.in, input);
   record.rig_configuration = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   if (wants_json) record.before = evaluate(problem);
-  Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
 
   Progress progress(arguments.common.quiet);
-  SolveOptions options = arguments.solve.options;
+  SolveOptions options = options_for(arguments, interrupt, progress);
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
-  options.threads = arguments.common.threads;
-  options.lend_observations = true;
-  options.stop = interrupt.token();
-  options.on_plan = [&](const Summary& summary) { progress.report_plan(summary); };
-  options.on_iteration = [&](const Iteration& iteration) {
-    progress.report(iteration);
-    return true;
-  };
+  SurveyWork work{place_survey(arguments.constraints, problem, options.fixed)};
+  Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
   interrupt.begin_solve();
   const double cpu_before_s = processor_seconds();
-  const Summary summary = try_solve(problem, options).value();
+  Summary summary = try_solve(problem, options).value();
   record.cpu_s = processor_seconds() - cpu_before_s;
   interrupt.begin_write();
 
   const Timer writing;
-  std::vector<std::string> written;
-  if (summary.usable()) written = write_results(arguments, std::move(before), problem);
-  record.write_s = writing.seconds();
-  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
-  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
-  fmt::print("{}", summary_text(summary, input.read_s));
-  fmt::print("{}", held);
   record.after = evaluate(problem);
   record.agrees = agrees(summary, record.after, problem);
-  if (!record.agrees)
-    fmt::print(
-        "wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
-        record.after.cost, summary.final_plain_cost);
+  finish(work, problem, summary);
+  if (work.survey) record.after = evaluate(problem);
+  std::vector<std::string> written;
+  if (summary.usable()) written = write_results(arguments, work, std::move(before), problem);
+  record.write_s = writing.seconds();
+  say(arguments, input, record, work, summary, held);
   if (wants_json) {
     record.total_s = total.seconds();
-    write_json(solve_json(record, summary, problem), arguments.common.json);
+    Json document = solve_json(record, summary, problem);
+    document["survey"] = survey_json(work.survey, &work.report);
+    write_json(document, arguments.common.json);
     written.push_back(arguments.common.json);
   }
   if (!written.empty()) fmt::print("wrote       {}\n", fmt::join(written, ", "));
@@ -167,7 +225,8 @@ Verb solve_verb() {
                                   .short_name = "o"}),
                          F::text(&Arguments::ply, ply_of_two_states())},
                         *a),
-       own(options_of(a->solve)), options_of(a->rigs), options_of(a->common)});
+       own(options_of(a->solve)), options_of(a->rigs), options_of(a->constraints, true),
+       options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

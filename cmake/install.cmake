@@ -20,8 +20,10 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/sheafConfigVersion.cmake
 install(FILES ${PROJECT_BINARY_DIR}/sheafConfig.cmake
               ${PROJECT_BINARY_DIR}/sheafConfigVersion.cmake DESTINATION ${SHEAF_PACKAGE_DIR})
 
+list(TRANSFORM GEOGRAPHICLIB_LIBRARIES PREPEND -l OUTPUT_VARIABLE SHEAF_GEOGRAPHICLIB)
+list(JOIN SHEAF_GEOGRAPHICLIB " " SHEAF_GEOGRAPHICLIB)
 # A static library hands its own dependencies on to whoever links it; a shared one keeps them.
-set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb -lpng -ljpeg -lz -lbz2 -pthread")
+set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb ${SHEAF_GEOGRAPHICLIB} -lpng -ljpeg -lz -lbz2 -pthread")
 if(BUILD_SHARED_LIBS)
   set(SHEAF_PC_LIBS "")
 else()

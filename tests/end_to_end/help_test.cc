@@ -89,6 +89,8 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
                     "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses"});
   if (verb == "info" || verb == "convert" || verb == "solve") options.insert("--rigs");
+  if (verb == "check" || verb == "solve") options.insert("--constraints");
+  if (verb == "solve") options.insert("--residuals");
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",

@@ -1,0 +1,93 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include "survey/survey_terms.h"
+
+#include <algorithm>
+#include <map>
+
+#include "io/line_cursor.h"
+
+namespace sheaf {
+namespace {
+
+std::string at_line(const Survey& survey, std::uint64_t line) {
+  return survey.constraints.path + ":" + std::to_string(line) + ": ";
+}
+
+/// The image of something that names one, or kNone and a sentence among the unused.
+template <class Named>
+std::uint32_t image_of(const Named& named, Survey& survey, const ImageNames& names) {
+  const std::uint32_t image = names.find(named.image);
+  if (image == Survey::kNone)
+    survey.unused.push_back(at_line(survey, named.line) + "the model has no image " +
+                            sheaf::quoted(named.image));
+  return image;
+}
+
+Result<void> add_lens(const Problem& problem, const LensValue& lens, std::uint32_t image,
+                      const Survey& survey, Terms& terms) {
+  const std::uint32_t camera = problem.image_camera[image];
+  const std::vector<std::string_view> names = parameter_names(problem.cameras[camera].model);
+  const auto found = std::find(names.begin(), names.end(), lens.parameter);
+  if (found == names.end()) {
+    std::string all;
+    for (const std::string_view name : names) all += (all.empty() ? "" : ", ") + std::string(name);
+    return Error(ErrorCode::unreadable_input, at_line(survey, lens.line) + "found the parameter " +
+                                                  sheaf::quoted(lens.parameter) +
+                                                  ", expected one that the lens of image " +
+                                                  sheaf::quoted(lens.image) + " has: " + all);
+  }
+  terms.parameters.push_back({camera, static_cast<std::uint32_t>(found - names.begin()), lens.value,
+                              lens.sigma, lens.loss});
+  return {};
+}
+
+Result<void> check_model_points(const Survey& survey) {
+  std::map<std::uint64_t, std::uint64_t> lines;
+  for (const SurveyPoint& point : survey.constraints.points) {
+    if (!point.model_point) continue;
+    const auto [at, is_new] = lines.try_emplace(*point.model_point, point.line);
+    if (!is_new)
+      return Error(ErrorCode::unreadable_input, at_line(survey, point.line) +
+                                                    "found the model's point " +
+                                                    std::to_string(*point.model_point) +
+                                                    " a second time, expected it once (line " +
+                                                    std::to_string(at->second) + ")");
+  }
+  return {};
+}
+
+}  // namespace
+
+Covariance3 covariance_of(const SurveyPoint& point) {
+  Covariance3 C{};
+  for (std::size_t k = 0; k < 3; ++k) C[4 * k] = point.sigma[k] * point.sigma[k];
+  return C;
+}
+
+Result<Terms> survey_terms(const Problem& problem, Survey& survey, const ImageNames& names) {
+  const Constraints& c = survey.constraints;
+  if (Result<void> good = check_model_points(survey); !good.ok()) return good.error();
+  Terms terms;
+  for (std::size_t i = 0; i < c.positions.size(); ++i) {
+    const ImagePosition& p = c.positions[i];
+    if (survey.position_image[i] != Survey::kNone)
+      terms.centres.push_back({survey.position_image[i], to_local(survey.frame, p.at), p.covariance,
+                               p.loss, p.lever_arm});
+  }
+  for (const ImageRotation& r : c.rotations)
+    if (const std::uint32_t image = image_of(r, survey, names); image != Survey::kNone)
+      terms.rotations.push_back({image, r.rotation, r.covariance, r.loss});
+  for (const ImageGravity& g : c.gravities)
+    if (const std::uint32_t image = image_of(g, survey, names); image != Survey::kNone)
+      terms.gravities.push_back({image, g.down, {0, 0, -1}, g.sigma_rad, g.loss});
+  for (const LensValue& lens : c.lenses) {
+    const std::uint32_t image = image_of(lens, survey, names);
+    if (image == Survey::kNone) continue;
+    if (Result<void> good = add_lens(problem, lens, image, survey, terms); !good.ok())
+      return good.error();
+  }
+  return terms;
+}
+
+}  // namespace sheaf
