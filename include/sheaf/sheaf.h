@@ -12,3 +12,4 @@
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
 #include "sheaf/stop.h"
+#include "sheaf/survey.h"
