@@ -124,7 +124,7 @@ TEST(LongDrive, EndsAlikeByEverySolver) {
   RigSceneOptions street;
   street.frames = 70;
   street.single_images = 4;
-  street.scene.points = 1200;
+  street.scene.points = 700;
   street.sensor_rotation_noise_rad = 0.002;
   const Scene scene = generate(street).value();
   Problem start = scene.start;
@@ -148,6 +148,7 @@ TEST(LongDrive, EndsAlikeByEverySolver) {
   for (const auto solver : {CameraSolverKind::sparse, CameraSolverKind::iterative_explicit,
                             CameraSolverKind::iterative_implicit})
     for (const auto precision : {Precision::full, Precision::mixed}) {
+      if (solver == CameraSolverKind::sparse && precision == Precision::mixed) continue;
       Problem p = start;
       SolveOptions options;
       options.solver = solver;
