@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "end_to_end/command.h"
+#include "end_to_end/rig_folders.h"
 #include "sheaf/camera.h"
 
 namespace sheaf {
@@ -63,9 +64,11 @@ TEST_F(ColmapAgrees, OnGeneratedModelsOfEveryCamera) {
 
 /// Rigs, frames and poses are those that COLMAP reads, in both forms.
 TEST_F(ColmapAgrees, OnRigs) {
-  for (const std::string name : {"stale-image-poses", "imu-reference"}) {
-    const std::string path = std::filesystem::absolute("tests/data/" + name);
-    ASSERT_EQ(run({"convert", path, name + "-binary", "--format", "colmap"}).exit_code, 0);
+  test::make_stale_folder(folder_, "stale");
+  test::make_imu_folder(folder_, "imu");
+  for (const std::string name : {"stale", "imu"}) {
+    std::filesystem::remove_all(folder_ / (name + "-binary"));  // what it was made from
+    ASSERT_EQ(run({"convert", name, name + "-binary", "--format", "colmap"}).exit_code, 0);
     ASSERT_EQ(
         run({"convert", name + "-binary", name + "-text", "--format", "colmap-text"}).exit_code, 0);
     for (const std::string form : {"-binary", "-text"}) {
