@@ -199,4 +199,12 @@ Result<std::size_t> ByteSource::read_compressed(char* to, std::size_t capacity) 
   return done;
 }
 
+Result<std::string> read_text(const std::filesystem::path& path) {
+  Result<RawBytes> raw = RawBytes::open(path);
+  if (!raw.ok()) return raw.error();
+  Result<ByteSource> source = ByteSource::open(std::move(raw).value());
+  if (!source.ok()) return source.error();
+  return source.value().read_rest();
+}
+
 }  // namespace sheaf

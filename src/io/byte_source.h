@@ -92,4 +92,7 @@ class ByteSource {
   std::uint64_t limit_ = std::uint64_t{1} << 20;
 };
 
+/// The whole text of a file, plain or compressed. Errors: unreadable_input.
+Result<std::string> read_text(const std::filesystem::path& path);
+
 }  // namespace sheaf

@@ -125,11 +125,7 @@ Result<RigConfigurationFile> parse_rig_configuration(const std::string& text,
 }
 
 Result<RigConfigurationFile> read_rig_configuration(const std::filesystem::path& path) {
-  Result<RawBytes> raw = RawBytes::open(path);
-  if (!raw.ok()) return raw.error();
-  Result<ByteSource> source = ByteSource::open(std::move(raw).value());
-  if (!source.ok()) return source.error();
-  const Result<std::string> text = source.value().read_rest();
+  const Result<std::string> text = read_text(path);
   if (!text.ok()) return text.error();
   return parse_rig_configuration(text.value(), path.string());
 }

@@ -103,11 +103,7 @@ Result<Constraints> parse_constraints(const std::string& text, const std::string
 }
 
 Result<Constraints> read_constraints(const std::filesystem::path& path) {
-  Result<RawBytes> raw = RawBytes::open(path);
-  if (!raw.ok()) return raw.error();
-  Result<ByteSource> source = ByteSource::open(std::move(raw).value());
-  if (!source.ok()) return source.error();
-  const Result<std::string> text = source.value().read_rest();
+  const Result<std::string> text = read_text(path);
   if (!text.ok()) return text.error();
   return parse_constraints(text.value(), path.string());
 }

@@ -288,11 +288,10 @@ void TermPlaces::add_kept(std::uint32_t kept, std::vector<TermPlace>& to) const 
 
 std::vector<Tile> tiles_of(const std::vector<std::unique_ptr<Term>>& terms) {
   std::vector<std::uint64_t> keys;
-  const auto stands = [](const TermPlace& at) { return at.block != TermPlaces::kHeld.block; };
   for (const auto& term : terms)
     for (const TermPlace& a : term->places())
       for (const TermPlace& b : term->places())
-        if (stands(a) && stands(b) && a.block > b.block)
+        if (a.stands() && b.stands() && a.block > b.block)
           keys.push_back(std::uint64_t(a.block) << 32 | b.block);
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());

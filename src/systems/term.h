@@ -17,6 +17,9 @@ namespace sheaf {
 struct TermPlace {
   std::uint32_t block;
   std::uint8_t column;
+
+  static constexpr std::uint32_t kHeld = 0xffffffff;  ///< no block: the column is held
+  bool stands() const { return block != kHeld; }
 };
 
 /// Rows without a point that is eliminated: a residual in sigmas and its derivatives by a few
@@ -74,7 +77,7 @@ class TermPlaces {
   void add_lens(std::uint32_t lens, std::size_t parameters, std::vector<TermPlace>& to) const;
   void add_kept(std::uint32_t kept, std::vector<TermPlace>& to) const;
 
-  static constexpr TermPlace kHeld{0xffffffff, 0};
+  static constexpr TermPlace kHeld{TermPlace::kHeld, 0};
 
  private:
   std::vector<std::vector<TermPlace>> lens_;  ///< of each parameter

@@ -36,10 +36,14 @@ void apply_loss(const ScaledLoss& loss, std::size_t columns, std::vector<double>
   for (double& x : r) x *= root / std::sqrt(phi);
 }
 
-bool stands(const TermPlace& place) { return place.block != TermPlaces::kHeld.block; }
-
-std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
-  return std::uint64_t(std::max(a, b)) << 32 | std::min(a, b);
+/// The tile of two blocks among those of the terms, which are in this order.
+std::size_t number_of(const Couplings& tiles, std::uint32_t row, std::uint32_t column) {
+  const auto before = [](const Tile& x, const Tile& y) {
+    return x.row != y.row ? x.row < y.row : x.column < y.column;
+  };
+  const Tile* found =
+      std::lower_bound(tiles.tiles, tiles.tiles + tiles.count, Tile{row, column}, before);
+  return static_cast<std::size_t>(found - tiles.tiles);
 }
 
 }  // namespace
@@ -80,7 +84,7 @@ class TermRows::Dogleg : public DoglegSource {
       const auto& places = rows_.terms_[t]->places();
       const Linear& of = rows_.linear_[t];
       for (std::size_t k = 0; k < places.size(); ++k)
-        for (std::size_t row = 0; row < of.r.size() && stands(places[k]); ++row)
+        for (std::size_t row = 0; row < of.r.size() && places[k].stands(); ++row)
           solved[kBlockVector * places[k].block + places[k].column] -=
               of.J[row * places.size() + k] * of.r[row];
     }
@@ -112,10 +116,7 @@ TermRows::TermRows(std::unique_ptr<PointRows> rows, std::vector<std::unique_ptr<
       kept_(kept),
       linear_(terms_.size()) {
   with_tiles_.tiles = rows_->chunks().tiles;
-  for (const Tile& tile : tiles_of(terms_)) {
-    keys_.push_back(key_of(tile.row, tile.column));
-    with_tiles_.tiles.push_back(tile);
-  }
+  for (const Tile& tile : tiles_of(terms_)) with_tiles_.tiles.push_back(tile);
 }
 
 TermRows::~TermRows() = default;
@@ -168,17 +169,18 @@ ReducedSums TermRows::finish(double* tiles, double* diagonal) {
   ReducedSums sums = rows_->finish(tiles, diagonal);
   linearize();
   const std::size_t first = chunks().tiles.size();
-  std::fill_n(tiles + kTileDoubles * first, kTileDoubles * keys_.size(), 0.0);
+  std::fill_n(tiles + kTileDoubles * first, kTileDoubles * more_tiles(), 0.0);
   std::fill_n(diagonal + kDiagonalDoubles * num_blocks(), kDiagonalDoubles * kept_, 0.0);
-  for (std::size_t t = 0; t < terms_.size(); ++t)
-    add_to_sums(*terms_[t], linear_[t], tiles + kTileDoubles * first, diagonal);
+  double* const more = tiles + kTileDoubles * first;
   sums.chunks = &with_tiles_;
-  sums.couplings = {with_tiles_.tiles.data() + first, tiles + kTileDoubles * first, keys_.size()};
+  sums.couplings = {with_tiles_.tiles.data() + first, more, more_tiles()};
+  for (std::size_t t = 0; t < terms_.size(); ++t)
+    add_to_sums(*terms_[t], linear_[t], sums.couplings, more, diagonal);
   return sums;
 }
 
-void TermRows::add_to_sums(const Term& term, const Linear& of, double* more_tiles,
-                           double* diagonal) const {
+void TermRows::add_to_sums(const Term& term, const Linear& of, const Couplings& couplings,
+                           double* more_tiles, double* diagonal) {
   const auto& places = term.places();
   const std::size_t n = places.size();
   const auto product = [&](std::size_t a, std::size_t b) {
@@ -189,19 +191,17 @@ void TermRows::add_to_sums(const Term& term, const Linear& of, double* more_tile
   };
   for (std::size_t a = 0; a < n; ++a) {
     const TermPlace& row = places[a];
-    if (!stands(row)) continue;
+    if (!row.stands()) continue;
     double* block = diagonal + kDiagonalDoubles * row.block;
     for (std::size_t r = 0; r < of.r.size(); ++r)
       block[diagonal_layout::right_side(row.column)] += of.J[r * n + a] * of.r[r];
     for (std::size_t b = 0; b < n; ++b) {
       const TermPlace& column = places[b];
-      if (!stands(column)) continue;
+      if (!column.stands()) continue;
       if (column.block == row.block && diagonal_layout::is_stored(row.column, column.column))
         block[diagonal_layout::at(row.column, column.column)] += product(a, b);
       if (column.block >= row.block) continue;
-      const auto key =
-          std::lower_bound(keys_.begin(), keys_.end(), key_of(row.block, column.block));
-      double* tile = more_tiles + kTileDoubles * static_cast<std::size_t>(key - keys_.begin());
+      double* tile = more_tiles + kTileDoubles * number_of(couplings, row.block, column.block);
       tile[tile_layout::at(row.column, column.column)] -= product(a, b);
     }
   }
@@ -215,9 +215,9 @@ void TermRows::multiply(const double* x, double* y) const {
       const double* J = &of.J[row * places.size()];
       double e = 0;
       for (std::size_t k = 0; k < places.size(); ++k)
-        if (stands(places[k])) e += J[k] * x[kBlockVector * places[k].block + places[k].column];
+        if (places[k].stands()) e += J[k] * x[kBlockVector * places[k].block + places[k].column];
       for (std::size_t k = 0; k < places.size(); ++k)
-        if (stands(places[k])) y[kBlockVector * places[k].block + places[k].column] += J[k] * e;
+        if (places[k].stands()) y[kBlockVector * places[k].block + places[k].column] += J[k] * e;
     }
   }
 }
@@ -235,7 +235,7 @@ std::unique_ptr<DoglegSource> TermRows::make_dogleg() {
 }
 
 std::uint64_t TermRows::bytes() const {
-  std::uint64_t sum = rows_->bytes() + 8 * keys_.size();
+  std::uint64_t sum = rows_->bytes();
   for (const Linear& of : linear_) sum += 8 * (of.J.capacity() + of.r.capacity());
   return sum;
 }

@@ -24,7 +24,9 @@ class TermRows : public PointRows {
   const Chunks& chunks() const override { return rows_->chunks(); }
   std::size_t num_blocks() const override { return rows_->num_blocks(); }
   std::size_t more_blocks() const override { return kept_; }
-  std::size_t more_tiles() const override { return keys_.size(); }
+  std::size_t more_tiles() const override {
+    return with_tiles_.tiles.size() - rows_->chunks().tiles.size();
+  }
   const Chunks& reduced_chunks() const override { return with_tiles_; }
   std::size_t scratch() const override { return rows_->scratch(); }
   bool keeps_metric() const override { return rows_->keeps_metric(); }
@@ -60,7 +62,8 @@ class TermRows : public PointRows {
 
   void linearize();
   Costs add_costs(const CameraState& at, const Costs& of_rows, const ScaledLoss& loss) const;
-  void add_to_sums(const Term& term, const Linear& of, double* more_tiles, double* diagonal) const;
+  static void add_to_sums(const Term& term, const Linear& of, const Couplings& couplings,
+                          double* more_tiles, double* diagonal);
   /// y += (N J)^T N J x, block vectors.
   void multiply(const double* x, double* y) const;
 
@@ -68,8 +71,7 @@ class TermRows : public PointRows {
   const std::vector<std::unique_ptr<Term>> terms_;
   const Columns& row_columns_;
   const std::size_t kept_;
-  Chunks with_tiles_;                ///< tiles alone: those of the rows, then the terms'
-  std::vector<std::uint64_t> keys_;  ///< of the terms' tiles: row, column; ascending
+  Chunks with_tiles_;  ///< tiles alone: those of the rows, then the terms'
   const SteppedState* state_ = nullptr;
   ScaledLoss loss_;
   std::vector<Linear> linear_;
