@@ -25,7 +25,8 @@ void check(const sheaf::Constraints& c) {
   for (const sheaf::ImagePosition& p : c.positions) {
     require(!p.image.empty(), "a position names its image");
     for (std::size_t k = 0; k < 3; ++k)
-      require(std::isfinite(p.at[k]) && above_zero(p.covariance[4 * k]), "a position and its sigma");
+      require(std::isfinite(p.at[k]) && above_zero(p.covariance[4 * k]),
+              "a position and its sigma");
   }
   for (const sheaf::SurveyPoint& point : c.points) {
     for (const double s : point.sigma) require(above_zero(s), "the sigma of a point");
