@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sheaf/camera.h"
+#include "sheaf/covariance.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 #include "sheaf/loss.h"

@@ -39,6 +39,13 @@ class SparseCholesky {
   bool factor(Threads& threads, const Fill& fill, const std::function<bool()>* cancelled = nullptr);
   /// x <- A^-1 x, after factor().
   void solve(double* x);
+  /// The diagonal of L, by columns as they were before the reordering.
+  double pivot(std::int32_t column) const { return 1 / inverse_[symbolic_.position[column]]; }
+  /// Puts the entries of A^-1 in the place of those of the factor, after factor(); the factor is
+  /// gone (selected_inverse.cc). Throws std::bad_alloc.
+  void invert(Threads& threads);
+  /// What it takes besides.
+  static std::uint64_t invert_bytes(const SymbolicFactor& symbolic);
 
  private:
   /// Rows source .. source + count of one panel stand at rows target .. of another.
@@ -61,6 +68,9 @@ class SparseCholesky {
                     std::int32_t end, double* scratch);
   void forward(const Supernode& s);
   void backward(const Supernode& s);
+  void invert_triangle(const Supernode& s, std::vector<double>& inverse) const;
+  void gather(const Supernode& s, double* A, std::size_t lda,
+              std::vector<std::size_t>& panel_row) const;
 
   const std::shared_ptr<const SymbolicFactor> shared_;
   const SymbolicFactor& symbolic_;  ///< what is shared

@@ -272,6 +272,18 @@ TermPlaces TermPlaces::of_lenses(const LensTracks& tracks) {
   return out;
 }
 
+TermPlaces TermPlaces::of_parameters(const Problem& problem) {
+  TermPlaces out;
+  auto block = static_cast<std::uint32_t>(problem.num_images());
+  for (const Camera& camera : problem.cameras) {
+    std::vector<TermPlace>& places = out.lens_.emplace_back();
+    for (std::uint8_t p = 0; p < parameter_count(camera.model); ++p) places.push_back({block, p});
+    ++block;
+  }
+  out.first_kept_ = block;
+  return out;
+}
+
 void TermPlaces::add_pose(std::uint32_t image, std::vector<TermPlace>& to) const {
   for (std::uint8_t k = 0; k < 6; ++k) to.push_back({image, k});
 }

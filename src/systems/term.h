@@ -70,6 +70,8 @@ class TermPlaces {
   static TermPlaces of_bal(const Problem& problem);
   /// Of rows through lenses of any model.
   static TermPlaces of_lenses(const LensTracks& tracks);
+  /// Of blocks of images, then of lenses with a column for each parameter, then of kept points.
+  static TermPlaces of_parameters(const Problem& problem);
 
   std::uint32_t first_kept() const { return first_kept_; }
   void add_pose(std::uint32_t image, std::vector<TermPlace>& to) const;
