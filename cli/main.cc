@@ -4,8 +4,8 @@
 
 int main(int argc, char** argv) {
   using namespace sheaf;
-  return run_command_line(
-      argc, argv,
-      {solve_verb(), info_verb(), check_verb(), convert_verb(), perturb_verb(), evaluate_verb(),
-       align_verb(), compare_verb(), photometric_verb(), generate_verb(), demo_verb()});
+  return run_command_line(argc, argv,
+                          {solve_verb(), info_verb(), check_verb(), convert_verb(), perturb_verb(),
+                           evaluate_verb(), align_verb(), covariance_verb(), compare_verb(),
+                           photometric_verb(), generate_verb(), demo_verb()});
 }

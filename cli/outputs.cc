@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "io/output_file.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 
@@ -41,6 +42,13 @@ std::uint64_t bytes_at(const std::string& path) {
 void print_losses(const std::string& format, const Problem& problem) {
   for (const std::string& sentence : lost_in(format, problem))
     fmt::print("dropped     {}\n", sentence);
+}
+
+void write_text(const std::string& text, const std::string& path) {
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(text);
+  file.value().commit().value();
 }
 
 }  // namespace sheaf

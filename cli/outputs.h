@@ -23,6 +23,9 @@ void check_outputs(const std::vector<NamedOutput>& outputs);
 /// Of a file, or of the files of a folder.
 std::uint64_t bytes_at(const std::string& path);
 
+/// Writes a text as a whole or not at all. Throws Error.
+void write_text(const std::string& text, const std::string& path);
+
 /// A line for each thing that a file of this format does not hold of the problem.
 void print_losses(const std::string& format, const Problem& problem);
 

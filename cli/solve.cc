@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "constraints_option.h"
+#include "covariance_document.h"
 #include "exit_code.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "options/solve_options.h"
 #include "outputs.h"
@@ -35,7 +35,7 @@ struct Arguments {
   SolveArguments solve;
   RigsArguments rigs;
   ConstraintsArguments constraints;
-  std::string in, out, ply;
+  std::string in, out, ply, sigmas;
 };
 
 // All but the observations, which are most of the memory while the solver needs its own.
@@ -62,6 +62,20 @@ struct SurveyWork {
   SurveyReport report{};
 };
 
+// How well the end is known, with the survey's terms still in the problem: --sigmas.
+struct SigmasWork {
+  CovarianceOptions options;
+  std::optional<Covariance> found;
+
+  void run(const Problem& problem, const SolveOptions& solved, const Summary& summary) {
+    options.fixed = solved.fixed;
+    options.threads = solved.threads;
+    if (solved.loss.kind != LossKind::none)
+      options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
+    found = covariance(problem, options).value();
+  }
+};
+
 // Points of the survey leave the problem, and the summary what it says of their marks.
 void finish(SurveyWork& work, Problem& problem, Summary& summary) {
   if (!work.survey) return;
@@ -70,13 +84,6 @@ void finish(SurveyWork& work, Problem& problem, Summary& summary) {
   for (auto* list : {&summary.behind_camera_before, &summary.behind_camera_after,
                      &summary.rejected_observations})
     std::erase_if(*list, [own](std::uint64_t i) { return i >= own; });
-}
-
-void write_text(const std::string& text, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(text);
-  file.value().commit().value();
 }
 
 // The best state found, and what was written.
@@ -141,12 +148,14 @@ SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt,
 
 // What is said once all is written.
 void say(const Arguments& arguments, const InputFile& input, const SolveRecord& record,
-         const SurveyWork& work, const Summary& summary, const std::string& held) {
+         const SurveyWork& work, const SigmasWork& sigmas, const Summary& summary,
+         const std::string& held) {
   fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   if (work.survey) fmt::print("{}", survey_text(*work.survey));
   fmt::print("{}", summary_text(summary, input.read_s));
   fmt::print("{}", residuals_text(work.report));
+  if (sigmas.found) fmt::print("{}", covariance_text(input.problem, *sigmas.found));
   fmt::print("{}", held);
   if (!record.agrees)
     fmt::print(
@@ -161,7 +170,8 @@ int run(Arguments& arguments) {
   check_outputs({{"-o", arguments.out, true},
                  {"--json", arguments.common.json},
                  {"--ply", arguments.ply},
-                 {"--residuals", arguments.constraints.residuals}});
+                 {"--residuals", arguments.constraints.residuals},
+                 {"--sigmas", arguments.sigmas}});
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
 
@@ -186,12 +196,21 @@ int run(Arguments& arguments) {
   const Timer writing;
   record.after = evaluate(problem);
   record.agrees = agrees(summary, record.after, problem);
+  SigmasWork sigmas;
+  if (!arguments.sigmas.empty() && summary.usable()) sigmas.run(problem, options, summary);
   finish(work, problem, summary);
   if (work.survey) record.after = evaluate(problem);
   std::vector<std::string> written;
   if (summary.usable()) written = write_results(arguments, work, std::move(before), problem);
+  if (sigmas.found) {
+    // Points of the survey are gone with it.
+    sigmas.found->points.resize(problem.num_points());
+    sigmas.found->observations.clear();
+    write_json(covariance_json(problem, sigmas.options, *sigmas.found), arguments.sigmas);
+    written.push_back(arguments.sigmas);
+  }
   record.write_s = writing.seconds();
-  say(arguments, input, record, work, summary, held);
+  say(arguments, input, record, work, sigmas, summary, held);
   if (wants_json) {
     record.total_s = total.seconds();
     Json document = solve_json(record, summary, problem);
@@ -217,16 +236,21 @@ Verb solve_verb() {
             "\nOnly a new image's pose, all else as it is:\n"
             "  sheaf solve model -o refined --fix points,poses,intrinsics --refine pose=new.jpg"};
   verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
-  verb.options = joined(
-      {bound<Arguments>({F::text(&Arguments::out,
-                                 {.name = "output",
-                                  .placeholder = "OUT",
-                                  .help = std::string("write the refined problem; ") + kProblemOut,
-                                  .short_name = "o"}),
-                         F::text(&Arguments::ply, ply_of_two_states())},
-                        *a),
-       own(options_of(a->solve)), options_of(a->rigs), options_of(a->constraints, true),
-       options_of(a->common)});
+  verb.options =
+      joined({bound<Arguments>(
+                  {F::text(&Arguments::out,
+                           {.name = "output",
+                            .placeholder = "OUT",
+                            .help = std::string("write the refined problem; ") + kProblemOut,
+                            .short_name = "o"}),
+                   F::text(&Arguments::ply, ply_of_two_states()),
+                   F::text(&Arguments::sigmas,
+                           {.name = "sigmas",
+                            .placeholder = "FILE",
+                            .help = "how well the end is known, as JSON (docs/covariance.md)"})},
+                  *a),
+              own(options_of(a->solve)), options_of(a->rigs), options_of(a->constraints, true),
+              options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -27,6 +27,7 @@ Verb convert_verb();
 Verb perturb_verb();
 Verb evaluate_verb();
 Verb align_verb();
+Verb covariance_verb();
 Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();

@@ -80,8 +80,8 @@ struct Covariance {
   std::vector<std::array<double, 9>> points;
   std::vector<ObservationReliability> observations;
 
-  std::vector<WeakDirection> weak;
-  std::vector<std::string> words;  ///< sentences: gauge, sigma, what is not determined
+  std::vector<WeakDirection> weak;  ///< by how far they are beyond the limits
+  std::vector<std::string> words;   ///< sentences: gauge, sigma, what is not determined
   std::uint64_t undetermined_points = 0;
   double seconds = 0;
 };

@@ -227,7 +227,12 @@ void add_words(const GaugeWeights& weights, const InverseNormal& inverse, Covari
   if (out.undetermined_points > 0)
     out.words.push_back(std::to_string(out.undetermined_points) +
                         " points are not determined by their observations");
-  for (const WeakDirection& weak : out.weak) out.words.push_back(weak.words);
+  constexpr std::size_t kMostSaid = 10;
+  for (std::size_t k = 0; k < std::min(kMostSaid, out.weak.size()); ++k)
+    out.words.push_back(out.weak[k].words);
+  if (out.weak.size() > kMostSaid)
+    out.words.push_back("and " + std::to_string(out.weak.size() - kMostSaid) +
+                        " more parameters or pairs are not determined");
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "geometry/camera_model.h"
 #include "starts/sights.h"
@@ -39,52 +41,81 @@ std::string number(double x) {
   return buffer;
 }
 
+/// What is found of one lens, with how far it is beyond its limit.
+class LensWeakness {
+ public:
+  LensWeakness(const Camera& camera, std::uint32_t index, const std::vector<double>& C,
+               const Reach& reach)
+      : camera_(camera),
+        index_(index),
+        C_(C),
+        reach_(reach),
+        n_(parameter_count(camera.model)),
+        names_(parameter_names(camera.model)) {}
+
+  void find(std::vector<std::pair<double, WeakDirection>>& to) const {
+    for (std::uint32_t p = 0; p < n_; ++p) find_one(p, to);
+    for (std::uint32_t a = 0; a < n_; ++a)
+      for (std::uint32_t b = a + 1; b < n_; ++b) find_pair(a, b, to);
+  }
+
+ private:
+  double sigma(std::size_t p) const { return std::sqrt(C_[(n_ + 1) * p]); }
+  std::string of() const { return " of camera " + std::to_string(index_); }
+
+  void find_one(std::uint32_t p, std::vector<std::pair<double, WeakDirection>>& to) const {
+    const ParameterRoles roles = roles_of(camera_.model);
+    const auto role = static_cast<int>(p);
+    const bool focal = role == roles.fx || role == roles.fy;
+    const bool centre = role == roles.cx || role == roles.cy;
+    const double s = sigma(p), limit = focal    ? kWeakFocal * std::abs(camera_.parameters[p])
+                                       : centre ? kWeakCentre_px
+                                                : kWeakCorner_px / reach_[p];
+    if (!(s > limit)) return;
+    std::string words = std::string(names_[p]) + of() + " is not determined";
+    if (std::isfinite(s))
+      words += ": its sigma " + number(s) +
+               (focal || centre ? std::string(" px")
+                                : " moves a pixel by up to " + number(s * reach_[p]) + " px");
+    to.push_back({s / limit, {words, index_, {p}, s, 0}});
+  }
+  void find_pair(std::uint32_t a, std::uint32_t b,
+                 std::vector<std::pair<double, WeakDirection>>& to) const {
+    const double both = sigma(a) * sigma(b);
+    if (!(both > 0) || std::isinf(both)) return;
+    const double correlation = C_[n_ * a + b] / both;
+    if (!(std::abs(correlation) > kWeakCorrelation)) return;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6f", correlation);
+    to.push_back({1,
+                  {std::string(names_[a]) + " and " + std::string(names_[b]) + of() +
+                       " cannot be told apart: correlation " + text,
+                   index_,
+                   {a, b},
+                   0,
+                   correlation}});
+  }
+
+  const Camera& camera_;
+  const std::uint32_t index_;
+  const std::vector<double>& C_;
+  const Reach& reach_;
+  const std::size_t n_;
+  const std::vector<std::string_view> names_;
+};
+
 }  // namespace
 
 std::vector<WeakDirection> weak_directions(const Problem& problem,
                                            const std::vector<std::vector<double>>& lenses) {
-  std::vector<WeakDirection> out;
   const std::vector<Reach> reach = reach_of(problem);
-  for (std::uint32_t c = 0; c < lenses.size(); ++c) {
-    const Camera& camera = problem.cameras[c];
-    const std::size_t n = parameter_count(camera.model);
-    const ParameterRoles roles = roles_of(camera.model);
-    const std::vector<std::string_view> names = parameter_names(camera.model);
-    const std::string of = " of camera " + std::to_string(c);
-    const auto sigma = [&](std::size_t p) { return std::sqrt(lenses[c][(n + 1) * p]); };
-    for (std::uint32_t p = 0; p < n; ++p) {
-      const double s = sigma(p);
-      if (!(s > 0)) continue;
-      const auto role = static_cast<int>(p);
-      const bool focal = role == roles.fx || role == roles.fy;
-      const bool centre = role == roles.cx || role == roles.cy;
-      const bool weak = std::isinf(s) || (focal    ? s > kWeakFocal * std::abs(camera.parameters[p])
-                                          : centre ? s > kWeakCentre_px
-                                                   : s * reach[c][p] > kWeakCorner_px);
-      if (!weak) continue;
-      std::string words = std::string(names[p]) + of + " is not determined";
-      if (std::isfinite(s))
-        words += ": its sigma " + number(s) +
-                 (focal || centre ? std::string(" px")
-                                  : " moves a pixel by up to " + number(s * reach[c][p]) + " px");
-      out.push_back({words, c, {p}, s, 0});
-    }
-    for (std::uint32_t a = 0; a < n; ++a)
-      for (std::uint32_t b = a + 1; b < n; ++b) {
-        const double sa = sigma(a), sb = sigma(b);
-        if (!(sa > 0) || !(sb > 0) || std::isinf(sa) || std::isinf(sb)) continue;
-        const double correlation = lenses[c][n * a + b] / (sa * sb);
-        if (!(std::abs(correlation) > kWeakCorrelation)) continue;
-        char text[32];
-        std::snprintf(text, sizeof text, "%.6f", correlation);
-        out.push_back({std::string(names[a]) + " and " + std::string(names[b]) + of +
-                           " cannot be told apart: correlation " + text,
-                       c,
-                       {a, b},
-                       0,
-                       correlation});
-      }
-  }
+  std::vector<std::pair<double, WeakDirection>> found;
+  for (std::uint32_t c = 0; c < lenses.size(); ++c)
+    LensWeakness(problem.cameras[c], c, lenses[c], reach[c]).find(found);
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<WeakDirection> out;
+  for (auto& [beyond, weak] : found) out.push_back(std::move(weak));
   return out;
 }
 

@@ -1,0 +1,157 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "constraints_option.h"
+#include "covariance_document.h"
+#include "interrupt.h"
+#include "json_document.h"
+#include "options/loss_option.h"
+#include "options/refinement.h"
+#include "outputs.h"
+#include "rigs_option.h"
+#include "sheaf/sheaf.h"
+#include "summary_text.h"
+#include "timer.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct Arguments {
+  CommonOptions common;
+  CovarianceOptions covariance;
+  RefinementArguments refinement;
+  RigsArguments rigs;
+  ConstraintsArguments constraints;
+  std::vector<std::string> points;
+  std::string in, csv;
+};
+
+/// Ids as the file has them, by index where it has none.
+std::vector<std::uint32_t> points_named(const std::vector<std::string>& names,
+                                        const Problem& problem) {
+  std::vector<std::uint32_t> out;
+  const SceneMetadata* m = problem.metadata.get();
+  for (const std::string& name : names) {
+    std::uint64_t id = 0;
+    const auto [end, wrong] = std::from_chars(name.data(), name.data() + name.size(), id);
+    if (wrong != std::errc() || end != name.data() + name.size())
+      throw Error(ErrorCode::usage,
+                  "--points: found '" + name + "', expected all, none or ids of points");
+    std::size_t index = id;
+    if (m != nullptr && !m->point_ids.empty())
+      index = static_cast<std::size_t>(std::find(m->point_ids.begin(), m->point_ids.end(), id) -
+                                       m->point_ids.begin());
+    if (index >= problem.num_points())
+      throw Error(ErrorCode::usage, "--points: the model has no point " + name);
+    out.push_back(static_cast<std::uint32_t>(index));
+  }
+  return out;
+}
+
+/// all (what is told of them as a whole), none, or those named, one by one.
+void choose_points(const Arguments& arguments, const Problem& problem, CovarianceOptions& options) {
+  if (arguments.points.empty() || arguments.points == std::vector<std::string>{"all"}) return;
+  if (arguments.points == std::vector<std::string>{"none"}) {
+    options.points = false;
+    return;
+  }
+  options.point_ids = points_named(arguments.points, problem);
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const std::string& json = arguments.common.json;
+  check_outputs({{"--json", json}, {"--csv", arguments.csv}});
+  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  Problem& problem = input.problem;
+  lay_rigs(arguments.rigs, input, arguments.common.quiet);
+  CovarianceOptions options = arguments.covariance;
+  options.threads = arguments.common.threads;
+  choose_points(arguments, problem, options);
+  if (arguments.refinement.given())
+    options.fixed = fixed_of(refinement_of(arguments.refinement, problem).value(), problem);
+  const std::optional<Survey> survey = place_survey(arguments.constraints, problem, options.fixed);
+  const Covariance found = covariance(problem, options).value();
+  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
+  if (survey) fmt::print("{}", survey_text(*survey));
+  fmt::print("{}time        {:.3f} s\n", covariance_text(problem, found), found.seconds);
+  if (!arguments.csv.empty()) {
+    write_text(covariance_csv(problem, options, found), arguments.csv);
+    fmt::print("wrote       {}\n", arguments.csv);
+  }
+  if (json.empty()) return 0;
+  Json document = covariance_json(problem, options, found);
+  document["version"] = SHEAF_VERSION;
+  document["input"] = input_json(arguments.in, input);
+  document["time"] = {
+      {"read_s", input.read_s}, {"covariance_s", found.seconds}, {"total_s", total.seconds()}};
+  write_json(document, json);
+  return 0;
+}
+
+std::vector<BoundOption> options_of(Arguments& a) {
+  using F = FieldsOf<Arguments>;
+  using C = FieldsOf<CovarianceOptions>;
+  const auto own_options = bound<Arguments>(
+      {F::list(&Arguments::points,
+               {.name = "points",
+                .placeholder = "IDS",
+                .help = "points to tell of one by one, by their ids; all: of all together (the "
+                        "default); none"}),
+       F::text(&Arguments::csv,
+               {.name = "csv", .placeholder = "FILE", .help = "a line for each parameter"})},
+      a);
+  const auto of_covariance = bound<CovarianceOptions>(
+      {C::choice(&CovarianceOptions::gauge,
+                 {{Gauge::automatic, "auto", "data where these fix the scene, else free"},
+                  {Gauge::data, "data", "nothing is added; refused where something is left free"},
+                  {Gauge::free_centres, "free", "the trace over camera centres is least"},
+                  {Gauge::free_points, "free-points", "the trace over points is least"},
+                  {Gauge::first_two, "first-two",
+                   "the first pose and one coordinate of the second are exact"}},
+                 {.name = "gauge", .help = "what stands for place, turn and scale"}),
+       C::real(&CovarianceOptions::sigma, {.name = "sigma",
+                                           .placeholder = "S",
+                                           .unit = "px",
+                                           .range = {.lowest = 0},
+                                           .help = "of a residual; 0: from the residuals"}),
+       loss_field<CovarianceOptions>(&CovarianceOptions::loss, {"pixels", false, false},
+                                     {.name = "loss", .help = "that the solve ended with"}),
+       C::flag(&CovarianceOptions::conditional,
+               {.name = "conditional", .help = "points with cameras held"}),
+       C::flag(&CovarianceOptions::observations,
+               {.name = "observations",
+                .help = "redundancy and standardised residual of each observation"})},
+      a.covariance);
+  return joined({of_covariance, own_options,
+                 own(bound(refinement_fields("what has no covariance"), a.refinement))});
+}
+
+}  // namespace
+
+Verb covariance_verb() {
+  using F = FieldsOf<Arguments>;
+  auto a = std::make_shared<Arguments>();
+  Verb verb{"covariance", "tell how well a state is known, which should be an optimum",
+            "Example:\n  sheaf covariance problem.txt --json sigmas.json\n"
+            "\nWhat its lens and three of its points are known to, in the gauge of two images:\n"
+            "  sheaf covariance model --gauge first-two --points 4711,4712,4713 --csv sigmas.csv"};
+  verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
+  verb.options = joined({options_of(*a), options_of(a->rigs), options_of(a->constraints, false),
+                         options_of(a->common)});
+  verb.run = [a] { return run(*a); };
+  return verb;
+}
+
+}  // namespace sheaf
