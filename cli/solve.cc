@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,7 +14,6 @@
 #include "constraints_option.h"
 #include "exit_code.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "options/solve_options.h"
 #include "outputs.h"
@@ -72,13 +70,6 @@ void finish(SurveyWork& work, Problem& problem, Summary& summary) {
     std::erase_if(*list, [own](std::uint64_t i) { return i >= own; });
 }
 
-void write_text(const std::string& text, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(text);
-  file.value().commit().value();
-}
-
 // The best state found, and what was written.
 std::vector<std::string> write_results(const Arguments& arguments, const SurveyWork& work,
                                        Problem before, const Problem& after) {
@@ -86,13 +77,14 @@ std::vector<std::string> write_results(const Arguments& arguments, const SurveyW
   if (!arguments.out.empty()) {
     write(after, arguments.out).value();
     written.push_back(arguments.out);
-    if (work.survey && write_format(after, arguments.out).starts_with("colmap")) {
-      written.push_back((std::filesystem::path(arguments.out) / "frame.json").string());
-      write_json(frame_json(*work.survey), written.back());
-    }
+    if (work.survey)
+      if (std::string frame =
+              write_frame(*work.survey, write_format(after, arguments.out), arguments.out);
+          !frame.empty())
+        written.push_back(std::move(frame));
   }
   if (!arguments.constraints.residuals.empty()) {
-    write_text(residuals_csv(work.report), arguments.constraints.residuals);
+    write_residuals(work.report, arguments.constraints.residuals);
     written.push_back(arguments.constraints.residuals);
   }
   if (!arguments.ply.empty()) {
