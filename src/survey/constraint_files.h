@@ -23,6 +23,10 @@ Result<Constraints> parse_geo_txt(const std::string& text, const std::string& na
 /// A table of positions with a line of column names.
 Result<Constraints> parse_position_table(const std::string& text, const std::string& name);
 
+/// Whether a text is OpenSfM's ground_control_points.json, whose points have observations.
+bool is_opensfm_points(const JsonValue& root);
+Result<Constraints> parse_opensfm_points(const JsonValue& root, const std::string& name);
+
 /// Several files as one. Errors: unreadable_input, where their frames differ.
 Result<Constraints> merge_constraints(std::vector<Constraints> parts);
 

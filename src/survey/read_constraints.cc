@@ -43,7 +43,8 @@ Result<Constraints> parse_any(const std::string& text, const std::string& name) 
   }
   const Result<JsonValue> root = parse_json(text, name);
   if (!root.ok()) return root.error();
-  return parse_survey_json(root.value(), name);
+  return is_opensfm_points(root.value()) ? parse_opensfm_points(root.value(), name)
+                                         : parse_survey_json(root.value(), name);
 }
 
 Result<Constraints> read_any(const std::filesystem::path& path) {
