@@ -27,6 +27,11 @@ Result<Constraints> parse_position_table(const std::string& text, const std::str
 bool is_opensfm_points(const JsonValue& root);
 Result<Constraints> parse_opensfm_points(const JsonValue& root, const std::string& name);
 
+/// The table pose_priors of a database of COLMAP: positions, and directions of gravity.
+Result<Constraints> read_pose_priors(const std::filesystem::path& path);
+/// The GPS tags of a JPEG, or of those in a folder and its folders.
+Result<Constraints> read_image_positions(const std::filesystem::path& path);
+
 /// Several files as one. Errors: unreadable_input, where their frames differ.
 Result<Constraints> merge_constraints(std::vector<Constraints> parts);
 

@@ -47,7 +47,29 @@ Result<Constraints> parse_any(const std::string& text, const std::string& name) 
                                          : parse_survey_json(root.value(), name);
 }
 
+/// The first bytes of a file; of a pipe, which is read once, none.
+Result<std::string> head_of(const std::filesystem::path& path) {
+  constexpr std::size_t kHead = 16;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return std::string();
+  Result<RawBytes> bytes = RawBytes::open(path);
+  if (!bytes.ok()) return bytes.error();
+  std::string out(kHead, '\0');
+  const Result<std::size_t> count = bytes.value().read(out.data(), out.size());
+  if (!count.ok()) return count.error();
+  out.resize(count.value());
+  return out;
+}
+
+/// Folders, and files that are not text, are read where they lie.
 Result<Constraints> read_any(const std::filesystem::path& path) {
+  constexpr std::string_view kJpeg = "\xff\xd8\xff", kSqlite{"SQLite format 3\0", 16};
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return read_image_positions(path);
+  const Result<std::string> head = head_of(path);
+  if (!head.ok()) return head.error();
+  if (head.value().starts_with(kJpeg)) return read_image_positions(path);
+  if (head.value() == kSqlite) return read_pose_priors(path);
   const Result<std::string> text = read_text(path);
   if (!text.ok()) return text.error();
   return parse_any(text.value(), path.string());
