@@ -167,6 +167,16 @@ Json cost_parts_json(const Summary& s) {
           {"gaussians", part_json(a.gaussians, b.gaussians)}};
 }
 
+Json bounds_json(const Summary& s) {
+  Json out = Json::array();
+  for (const BoundReached& at : s.at_bounds)
+    out.push_back({{"camera", at.camera},
+                   {"parameter", at.name},
+                   {"value", number(at.value)},
+                   {"bound", at.upper ? "upper" : "lower"}});
+  return out;
+}
+
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
   return {
       {"version", SHEAF_VERSION},
@@ -183,6 +193,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
       {"initial_cost", number(s.initial_cost)},
       {"final_cost", number(s.final_cost)},
       {"cost_parts", cost_parts_json(s)},
+      {"at_bounds", bounds_json(s)},
       {"loss", loss_json(s)},
       {"rms_px", {{"before", number(s.initial_rms_px)}, {"after", number(s.final_rms_px)}}},
       {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},

@@ -62,6 +62,9 @@ std::string summary_text(const Summary& s, double read_s) {
         r.after_step, r.passes, r.from_start ? "from the start" : "from there", r.cost_before,
         r.cost_after, r.taken ? "" : "; not taken");
   out += fmt::format("stopped     {}\n", s.words);
+  for (const BoundReached& at : s.at_bounds)
+    out += fmt::format("at bound    {} of camera {} at its {} bound {:.9g}\n", at.name, at.camera,
+                       at.upper ? "upper" : "lower", at.value);
   out += fmt::format("time        read {:.3f} s, set-up {:.3f} s, solve {:.3f} s\n", read_s,
                      s.setup_s, s.solve_s);
   out += fmt::format("solver      {} ({}); {}, {}, {} thread{}\n", s.solver, s.solver_reason,

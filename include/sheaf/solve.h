@@ -95,6 +95,7 @@ struct Summary {
   double final_rms_px = 0;
   /// What of the costs is the terms'; the rest is the observations'.
   TermCosts initial_terms, final_terms;
+  std::vector<BoundReached> at_bounds;  ///< of Terms::bounds, at the end
   Termination termination = Termination::no_usable_step;
   std::string words;  ///< the reason for stopping, as a sentence
   std::vector<Iteration> iterations;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -105,12 +106,15 @@ struct ScaleBar {
   std::uint32_t file = 0;
 };
 
-/// A parameter of the lens of an image.
+/// A parameter of the lens of an image: measured, kept between bounds, or both.
 struct LensValue {
   std::string image;
   std::string parameter;        ///< as the camera's model calls it: "fx", "k1"
-  double value = 0, sigma = 1;  ///< in the parameter's unit
+  std::optional<double> value;  ///< in the parameter's unit
+  double sigma = 1;             ///< of the value
   TermLoss loss{};
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
   std::uint64_t line = 0;
   std::uint32_t file = 0;
 };

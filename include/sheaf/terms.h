@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "sheaf/loss.h"
@@ -70,6 +72,15 @@ struct ParameterPrior {
   TermLoss loss{};
 };
 
+/// A parameter of a lens stays within an interval that it starts in; an end may be infinite. It
+/// costs nothing: where a parameter is at its bound and pushed outward, it is held for the step.
+struct ParameterBound {
+  std::uint32_t camera = 0;
+  std::uint32_t parameter = 0;                              ///< as the camera's model numbers them
+  double lower = -std::numeric_limits<double>::infinity();  ///< in the parameter's unit
+  double upper = std::numeric_limits<double>::infinity();
+};
+
 /// A point was measured: cost 1/2 e^T C^-1 e, e = point - position. It has no loss: it is a part of
 /// the point's own 3x3 system, which is eliminated.
 struct PointPrior {
@@ -114,6 +125,7 @@ struct Terms {
   std::vector<PointPrior> points;
   std::vector<DistancePrior> distances;
   std::vector<GaussianPrior> gaussians;
+  std::vector<ParameterBound> bounds;  ///< one of a parameter
   /// Points that are columns of the camera system beside the images: hundreds, not thousands. Those
   /// that `distances` and `gaussians` name are kept whether they stand here or not.
   std::vector<std::uint32_t> kept_points;
@@ -121,8 +133,16 @@ struct Terms {
   bool empty() const {
     return centres.empty() && rotations.empty() && gravities.empty() && relative_poses.empty() &&
            parameters.empty() && points.empty() && distances.empty() && gaussians.empty() &&
-           kept_points.empty();
+           bounds.empty() && kept_points.empty();
   }
+};
+
+/// A parameter that ended at one of its bounds.
+struct BoundReached {
+  std::uint32_t camera = 0, parameter = 0;
+  std::string name;  ///< of the parameter
+  double value = 0;
+  bool upper = false;
 };
 
 /// What each kind of terms costs: 1/2 sum rho, in sigmas squared.

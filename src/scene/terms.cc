@@ -75,6 +75,19 @@ std::string at(const char* what, const std::vector<Term>& all, const Term& term,
 
 }  // namespace
 
+std::vector<BoundReached> bounds_reached(const Problem& problem) {
+  std::vector<BoundReached> out;
+  for (const ParameterBound& of : problem.terms.bounds) {
+    const Camera& camera = problem.cameras[of.camera];
+    const double value = camera.parameters[of.parameter];
+    if (value == of.lower || value == of.upper)
+      out.push_back({of.camera, of.parameter,
+                     std::string(parameter_names(camera.model)[of.parameter]), value,
+                     value == of.upper});
+  }
+  return out;
+}
+
 std::optional<std::array<double, 9>> whitening(const Covariance3& C) {
   for (const double x : C)
     if (!std::isfinite(x)) return {};
@@ -264,15 +277,40 @@ std::optional<std::string> wrong_term(const Problem& problem, const RelativePose
   return wrong_loss(of.loss);
 }
 
-std::optional<std::string> wrong_term(const Problem& problem, const ParameterPrior& of) {
-  if (of.camera >= problem.cameras.size()) return "it names a camera that there is not";
-  const CameraModel model = problem.cameras[of.camera].model;
-  if (of.parameter >= parameter_count(model))
+std::optional<std::string> wrong_parameter(const Problem& problem, std::uint32_t camera,
+                                           std::uint32_t parameter) {
+  if (camera >= problem.cameras.size()) return "it names a camera that there is not";
+  const CameraModel model = problem.cameras[camera].model;
+  if (parameter >= parameter_count(model))
     return std::string(to_string(model)) + " has " + std::to_string(parameter_count(model)) +
            " parameters";
+  return {};
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const ParameterPrior& of) {
+  if (auto wrong = wrong_parameter(problem, of.camera, of.parameter)) return wrong;
   if (!(of.sigma > 0) || !std::isfinite(of.sigma) || !std::isfinite(of.value))
     return "the value must be finite, its sigma finite and above 0";
   return wrong_loss(of.loss);
+}
+
+std::optional<std::string> wrong_term(const Problem& problem, const ParameterBound& of) {
+  if (auto wrong = wrong_parameter(problem, of.camera, of.parameter)) return wrong;
+  if (!(of.lower <= of.upper)) return "the lower end is above the upper one";
+  const double value = problem.cameras[of.camera].parameters[of.parameter];
+  if (!(of.lower <= value && value <= of.upper)) return "the parameter starts outside it";
+  return {};
+}
+
+std::optional<std::string> wrong_bounds(const Problem& problem) {
+  std::set<std::pair<std::uint32_t, std::uint32_t>> bounded;
+  for (const ParameterBound& of : problem.terms.bounds) {
+    auto wrong = wrong_term(problem, of);
+    if (!wrong && !bounded.insert({of.camera, of.parameter}).second)
+      wrong = "the parameter has another one";
+    if (wrong) return at("bound", problem.terms.bounds, of, *wrong);
+  }
+  return {};
 }
 
 std::optional<std::string> wrong_pose_terms(const Problem& problem) {
@@ -298,6 +336,7 @@ std::optional<std::string> wrong_terms(const Problem& problem) {
     if (wrong) return at("centre prior", terms.centres, of, *wrong);
   }
   if (auto wrong = wrong_pose_terms(problem)) return wrong;
+  if (auto wrong = wrong_bounds(problem)) return wrong;
   std::set<std::uint32_t> named;
   for (const PointPrior& of : terms.points) {
     auto wrong = wrong_position(of.position, of.covariance, {});

@@ -15,6 +15,7 @@
 #include "platform/memory.h"
 #include "scene/behind.h"
 #include "scene/rigs.h"
+#include "scene/terms.h"
 #include "solve/endings.h"
 #include "solve/loss_rounds.h"
 #include "solve/recovery.h"
@@ -53,6 +54,8 @@ Result<void> check(const Problem& problem, const SolveOptions& options) {
   if (options.trust_region == TrustRegion::dogleg && options.points != PointParametrisation::xyz &&
       options.points != PointParametrisation::automatic)
     return usage("the dogleg steps points by X, Y, Z: it takes no other parametrisation of points");
+  if (options.trust_region == TrustRegion::dogleg && !problem.terms.bounds.empty())
+    return usage("the dogleg knows no bounds of parameters: Levenberg-Marquardt does");
   return {};
 }
 
@@ -312,6 +315,7 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
   summary.initial_rms_px = rms(summary.initial_plain_cost, used);
   summary.final_rms_px = rms(summary.final_plain_cost, used);
   summary.final_terms = evaluate_terms(problem);
+  summary.at_bounds = bounds_reached(problem);
   if (!problem.observation_sigma.empty()) {
     summary.initial_rms_px = rms_before_px;
     summary.final_rms_px = plain_rms_px(problem);

@@ -65,6 +65,7 @@ class Placing {
     add_points();
     add_survey_points(terms.value());
     problem_.terms = std::move(terms).value();
+    if (!manner_.must_move) start_within_bounds();
     out_.metadata = std::move(problem_.metadata);
     problem_.metadata = nullptr;
     return std::move(out_);
@@ -318,6 +319,19 @@ class Placing {
       problem_.observation_sigma.insert(problem_.observation_sigma.end(), sigmas.begin(),
                                         sigmas.end());
     add_scale_bars(terms);
+  }
+
+  void start_within_bounds() {
+    for (const ParameterBound& bound : problem_.terms.bounds) {
+      Camera& camera = problem_.cameras[bound.camera];
+      double& value = camera.parameters[bound.parameter];
+      const double start = std::clamp(value, bound.lower, bound.upper);
+      if (start == value) continue;
+      out_.words.push_back(std::string(parameter_names(camera.model)[bound.parameter]) +
+                           " of camera " + std::to_string(bound.camera) + " starts at its bound " +
+                           figures(start) + ": the model has " + figures(value));
+      value = start;
+    }
   }
 
   void add_scale_bars(Terms& terms) {

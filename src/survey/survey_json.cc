@@ -217,11 +217,19 @@ class Reading : JsonReading {
     bar.loss = loss(v, "loss", {});
   }
   void read_lens(const JsonValue& v) {
-    if (!known(v, "a value of a lens", {"image", "parameter", "value", "sigma", "loss"})) return;
+    if (!known(v, "a value of a lens",
+               {"image", "parameter", "value", "sigma", "loss", "min", "max"}))
+      return;
     LensValue& lens = out_.lenses.emplace_back();
     lens.line = v.line;
     lens.image = name(v, "image");
     lens.parameter = text(v, "parameter");
+    if (v.find("min") != nullptr) lens.lower = number(v, "min");
+    if (v.find("max") != nullptr) lens.upper = number(v, "max");
+    if (!error_ && !(lens.lower <= lens.upper))
+      refuse(v.find("max")->line, "\"max\" below \"min\"", "an interval");
+    const bool bounded = std::isfinite(lens.lower) || std::isfinite(lens.upper);
+    if (bounded && v.find("value") == nullptr && v.find("sigma") == nullptr) return;
     lens.value = number(v, "value");
     lens.sigma = above_zero(v, "sigma");
     lens.loss = loss(v, "loss", {});

@@ -3,6 +3,7 @@
 #include "survey/survey_terms.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "io/line_cursor.h"
@@ -39,8 +40,16 @@ Result<void> add_lens(const Problem& problem, const LensValue& lens, std::uint32
                                                   ", expected one that the lens of image " +
                                                   sheaf::quoted(lens.image) + " has: " + all);
   }
-  terms.parameters.push_back({camera, static_cast<std::uint32_t>(found - names.begin()), lens.value,
-                              lens.sigma, lens.loss});
+  const auto parameter = static_cast<std::uint32_t>(found - names.begin());
+  if (lens.value)
+    terms.parameters.push_back({camera, parameter, *lens.value, lens.sigma, lens.loss});
+  if (!std::isfinite(lens.lower) && !std::isfinite(lens.upper)) return {};
+  for (const ParameterBound& bound : terms.bounds)
+    if (bound.camera == camera && bound.parameter == parameter)
+      return Error(ErrorCode::unreadable_input,
+                   at(survey, lens) + "found bounds of " + lens.parameter +
+                       " of a lens that has them already, expected them once for all its images");
+  terms.bounds.push_back({camera, parameter, lens.lower, lens.upper});
   return {};
 }
 

@@ -83,7 +83,8 @@ void join_kept(const Problem& problem, const std::vector<std::uint32_t>& kept, c
 
 /// Whether terms are of states that BAL's view would restate.
 bool restates_terms(const Problem& problem) {
-  return (!problem.terms.gaussians.empty() || !problem.terms.parameters.empty()) &&
+  return (!problem.terms.gaussians.empty() || !problem.terms.parameters.empty() ||
+          !problem.terms.bounds.empty()) &&
          !has_only_bal_cameras(problem);
 }
 
@@ -226,6 +227,7 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
   const Columns& columns = arranged_->columns;
   CameraColumns camera_columns = view_ ? CameraColumns::of_bal(columns, problem.image_camera)
                                        : CameraColumns::of_lenses(columns, arranged_->tracks);
+  camera_columns.keep_within(problem.terms.bounds);
   std::unique_ptr<PointRows> rows;
   if (view_)
     rows = std::make_unique<BalRows>(*arranged_, problem.image_camera, kernels, *threads_);

@@ -4,10 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "eliminate/kernels.h"
 
 namespace sheaf {
+namespace {
+
+// Conjugate gradients count by how much the model falls; a column that is sent to its bound falls
+// 1e8 times as deep as its own row would.
+constexpr double kStepsToBound = 1e-8;
+
+}  // namespace
 
 CameraStage::CameraStage(const Columns& columns, const Reduction& reduction)
     : columns_(columns), reduction_(reduction) {
@@ -16,12 +24,14 @@ CameraStage::CameraStage(const Columns& columns, const Reduction& reduction)
   step_.allocate(padded);
 }
 
-double CameraStage::gather(const ReducedSums& sums, double lambda) {
+double CameraStage::gather(const ReducedSums& sums, double lambda, std::vector<StepBound> bounds) {
   vectors_.gather(sums, columns_);
+  bounds_.begin(std::move(bounds), vectors_.rhs, vectors_.squares);
   double gradient = 0;
   for (std::int32_t c = 0; c < columns_.count; ++c) {
     const double square = std::clamp(vectors_.squares[c], kDiagonalFloor, kDiagonalCeiling);
     damping_[c] = lambda * square;
+    if (bounds_.holds(c)) continue;
     gradient = std::max(gradient, std::abs(vectors_.rhs[c]) / std::sqrt(square));
   }
   reduction_.max(&gradient, 1);
@@ -32,10 +42,10 @@ CameraSystem CameraStage::system(const ReducedSums& sums, const StepRequest& req
   return {sums,
           &vectors_,
           damping_.data(),
-          request.forcing,
+          bounds_.steps() ? kStepsToBound * request.forcing : request.forcing,
           request.cancelled,
           corrected_ ? coarse_.get() : nullptr,
-          request.precise,
+          request.precise || bounds_.hold_any(),
           request.radius,
           request.damping,
           request.dogleg};
@@ -45,11 +55,21 @@ bool CameraStage::solve(const ReducedSums& sums, const StepRequest& request, Ste
   residual_ = nullptr;
   cut_ = false;
   if (columns_.count == 0) return true;
+  do {
+    if (bounds_.prescribe(vectors_.rhs, damping_)) solver_->restore({});
+    const bool solved = solve_once(sums, request, step);
+    bounds_.put_back(vectors_.rhs, damping_, step_);
+    if (!solved) return false;
+  } while (bounds_.add_crossing(step_));
+  return true;
+}
+
+bool CameraStage::solve_once(const ReducedSums& sums, const StepRequest& request, Step& step) {
   corrected_ = coarse_ && coarse_->factor(sums.of_rows != nullptr ? sums.of_rows : sums.diagonal,
                                           damping_.data(), sums.couplings);
   const CameraSolution solution = solver_->solve(system(sums, request), step_);
   ++solves_;
-  step.linear_iterations = solution.iterations;
+  step.linear_iterations += solution.iterations;
   if (coarse_) coarse_->solved(solution.iterations);
   residual_ = solution.residual;
   cut_ = solution.cut;
@@ -86,7 +106,7 @@ void CameraStage::restore(const History& history) {
 double CameraStage::add_decrease(double sum) const {
   for (std::int32_t c = 0; c < columns_.count; ++c)
     sum += step_[c] * (vectors_.rhs[c] + damping_[c] * step_[c]);
-  return sum;
+  return sum + bounds_.correction();
 }
 
 double CameraStage::add_damping(double sum) const {

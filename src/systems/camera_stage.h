@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "lists/columns.h"
 #include "platform/buffer.h"
 #include "reduced/camera_solver.h"
 #include "reduced/coarse_space.h"
 #include "reduced/reduction.h"
+#include "systems/active_bounds.h"
 #include "systems/system.h"
 
 namespace sheaf {
@@ -27,8 +29,8 @@ class CameraStage {
   CoarseSpace* coarse() { return coarse_.get(); }
 
   /// Right-hand side and damping of the columns; returns the largest |rhs_i| / |J_i|, the scaled
-  /// gradient of the free columns.
-  double gather(const ReducedSums& sums, double lambda);
+  /// gradient of the free columns. Columns at a bound that they are pushed against are not free.
+  double gather(const ReducedSums& sums, double lambda, std::vector<StepBound> bounds = {});
   /// False where no finite step came out.
   bool solve(const ReducedSums& sums, const StepRequest& request, Step& step);
   /// Conjugate gradients would have stopped at the smaller radius: their path is cut there. True
@@ -68,11 +70,13 @@ class CameraStage {
   std::uint64_t bytes() const;
 
  private:
+  bool solve_once(const ReducedSums& sums, const StepRequest& request, Step& step);
   CameraSystem system(const ReducedSums& sums, const StepRequest& request) const;
 
   const Columns& columns_;
   const Reduction& reduction_;
   CameraVectors vectors_;
+  ActiveBounds bounds_;
   Buffer<double> damping_, step_, blended_;
   std::unique_ptr<CoarseSpace> coarse_;
   std::unique_ptr<CameraSolver> solver_;

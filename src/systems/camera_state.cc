@@ -14,6 +14,12 @@ namespace {
 
 double norm(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
 
+/// A step up to a bound ends on it, whatever the sum rounds to.
+double bounded(double value, double change, double lower, double upper) {
+  if (change >= upper - value) return upper;
+  return change <= lower - value ? lower : value + change;
+}
+
 }  // namespace
 
 CameraState camera_state(const Problem& problem) {
@@ -115,6 +121,25 @@ void CameraColumns::add_kept(const Columns& columns, std::size_t first_block, st
   }
 }
 
+void CameraColumns::keep_within(const std::vector<ParameterBound>& bounds) {
+  for (const ParameterBound& bound : bounds)
+    for (Parameter& p : parameters_)
+      if (p.set == bound.camera && p.index == bound.parameter) {
+        p.lower = bound.lower;
+        p.upper = bound.upper;
+      }
+}
+
+std::vector<StepBound> CameraColumns::step_bounds(const CameraState& from) const {
+  std::vector<StepBound> out;
+  for (const Parameter& p : parameters_) {
+    const double value = from.sets[p.set][p.index];
+    if (std::isfinite(p.lower) || std::isfinite(p.upper))
+      out.push_back({p.column, p.lower - value, p.upper - value});
+  }
+  return out;
+}
+
 CameraColumns CameraColumns::of_brightness(const Columns& columns) {
   CameraColumns out(columns, columns.num_images());
   for (std::size_t i = 0; i < columns.num_images(); ++i) {
@@ -197,7 +222,7 @@ double CameraColumns::step(const CameraState& from, const Buffer<double>& x,
     const double unit = p.relative_to >= 0
                             ? std::abs(held[static_cast<std::size_t>(p.relative_to)]) + 1e-300
                             : p.unit;
-    to.sets[p.set][p.index] = held[p.index] + change;
+    to.sets[p.set][p.index] = bounded(held[p.index], change, p.lower, p.upper);
     largest = std::max(largest, std::abs(change) / unit);
   }
   return largest;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "geometry/rigid_motion.h"
@@ -12,6 +13,7 @@
 #include "lists/lens_tracks.h"
 #include "platform/buffer.h"
 #include "sheaf/problem.h"
+#include "systems/active_bounds.h"
 
 namespace sheaf {
 
@@ -51,6 +53,8 @@ class CameraColumns {
     std::int8_t relative_to = kNone;
     double unit = 1;
     std::int32_t column;
+    double lower = -std::numeric_limits<double>::infinity();
+    double upper = std::numeric_limits<double>::infinity();
   };
 
   /// BAL lenses: f, k1, k2 are the first three parameters of an image's lens.
@@ -62,6 +66,8 @@ class CameraColumns {
   CameraColumns through(const BlockMap& map, const Rigs& rigs) const;
   /// Kept points: columns 0 to 2 of these blocks.
   void add_kept(const Columns& columns, std::size_t first_block, std::size_t count);
+  /// Bounds of parameters; those of parameters that are held say nothing.
+  void keep_within(const std::vector<ParameterBound>& bounds);
   /// Brightness a and b of each image: columns 6 and 7 of its block. b counts in grey levels of
   /// 255.
   static CameraColumns of_brightness(const Columns& columns);
@@ -69,6 +75,9 @@ class CameraColumns {
   /// to = from, stepped by x. Returns the largest relative change of any one block: radians for
   /// rotations, relative to its length for translations, parameters as said above.
   double step(const CameraState& from, const Buffer<double>& x, CameraState& to) const;
+
+  /// How far the columns of bounded parameters may step.
+  std::vector<StepBound> step_bounds(const CameraState& from) const;
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
 

@@ -185,8 +185,9 @@ Step PointSystem::collect_step(const StepRequest& request,
   step.cost = costs.robust / 2;
   mean_square_ = 2 * step.cost / static_cast<double>(rows_->batches().observations);
   // w is whitened by V (1 + damping): undo the damping's part.
-  step.gradient_max =
-      std::max(std::sqrt(gradient2 * (1 + request.damping)), stage_.gather(sums_, request.damping));
+  step.gradient_max = std::max(
+      std::sqrt(gradient2 * (1 + request.damping)),
+      stage_.gather(sums_, request.damping, camera_columns_.step_bounds(state_.held.cameras)));
   step.solved = costs.finite() && stage_.solve(sums_, request, step);
   return step;
 }

@@ -71,7 +71,11 @@ TEST(SurveyRead, TheExampleOfThePageIsRead) {
   EXPECT_EQ(c.positions[0].loss.kind, LossKind::cauchy);
   EXPECT_EQ(c.points.size(), 3u);
   EXPECT_EQ(c.points[0].marks[1].sigma_px, 0.5);
-  EXPECT_EQ(c.rotations.size() + c.gravities.size() + c.scale_bars.size() + c.lenses.size(), 4u);
+  EXPECT_EQ(c.rotations.size() + c.gravities.size() + c.scale_bars.size() + c.lenses.size(), 5u);
+  EXPECT_EQ(c.lenses[0].value, 3650);
+  EXPECT_FALSE(c.lenses[1].value);
+  EXPECT_EQ(c.lenses[1].lower, -0.3);
+  EXPECT_EQ(c.lenses[1].upper, 0);
 }
 
 TEST(SurveyRead, FilesOfOtherProgramsAreRead) {
