@@ -117,8 +117,8 @@ class Reading {
     return Error(ErrorCode::unreadable_input, path_.string() + ": " + words);
   }
   std::string said() const {
-    return "found what SQLite calls \"" + std::string(sqlite3_errmsg(database_.get())) +
-           "\", expected a database of COLMAP";
+    return "found what SQLite calls " + sheaf::quoted(sqlite3_errmsg(database_.get())) +
+           ", expected a database of COLMAP";
   }
 
   std::optional<Error> open() {
