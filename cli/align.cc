@@ -4,8 +4,10 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "constraints_option.h"
 #include "errors_document.h"
 #include "interrupt.h"
 #include "json_document.h"
@@ -24,7 +26,8 @@ namespace {
 
 struct Arguments {
   CommonOptions common;
-  std::string in, out, reference, format;
+  ConstraintsArguments constraints;
+  std::string in, out, reference, to, format;
   bool rigid = false, least_squares = false;
 };
 
@@ -81,17 +84,87 @@ Json document_of(const Arguments& arguments, const ModelAlignment& a, const Inpu
       {"common", matching_json(a.matching, model.problem, reference.problem, "input", "reference")},
       {"alignment", alignment_json(arguments, a)},
       {"center_error", error_json(statistics_of_errors(a.distances))},
-      {"worst", worst_json(a, model.problem)}};
+      {"worst", worst_json(a, model.problem)},
+      {"survey", Json()}};
 }
 
-int run(const Arguments& arguments) {
-  const Timer total;
-  Interrupt interrupt(arguments.common.quiet);
-  const std::string& json = arguments.common.json;
-  if (arguments.out.empty()) throw Error(ErrorCode::usage, "where to? --output OUT");
-  if (arguments.reference.empty()) throw Error(ErrorCode::usage, "onto what? --reference MODEL");
-  check_outputs({{"--output", arguments.out, true}, {"--json", json}});
-  const ReadOptions hash{.hash = !json.empty()};
+// By a survey there is no model to compare with.
+Json document_of(const Survey& survey, const SurveyReport& report, const Json& input) {
+  return {{"version", SHEAF_VERSION},
+          {"input", input},
+          {"reference", Json()},
+          {"common", Json()},
+          {"alignment",
+           {{"scale", survey.scale},
+            {"rotation", survey.rotation},
+            {"translation", survey.translation},
+            {"rigid", survey.rigid},
+            {"robust", true},
+            {"places", survey.ties},
+            {"inliers", survey.ties - survey.outliers.size()}}},
+          {"center_error", Json()},
+          {"worst", Json::array()},
+          {"survey", survey_json(survey, &report)}};
+}
+
+// What both ways end with.
+struct Written {
+  std::string format;
+  double write_s = 0;
+};
+
+Written write_moved(const Arguments& arguments, const Problem& problem, Interrupt& interrupt) {
+  validate(problem).value();
+  Written out{arguments.format.empty() ? write_format(problem, arguments.out) : arguments.format};
+  interrupt.begin_write();
+  const Timer writing;
+  write(problem, arguments.out, {.format = out.format}).value();
+  out.write_s = writing.seconds();
+  return out;
+}
+
+void finish(const Arguments& arguments, const Written& written, const Problem& problem,
+            double read_s, const Timer& total, Json document) {
+  fmt::print("wrote       {} ({})\n", arguments.out, written.format);
+  print_losses(written.format, problem);
+  if (arguments.common.json.empty()) return;
+  document["output"] = {
+      {"path", arguments.out}, {"format", written.format}, {"bytes", bytes_at(arguments.out)}};
+  document["dropped"] = lost_in(written.format, problem);
+  document["time"] = {
+      {"read_s", read_s}, {"write_s", written.write_s}, {"total_s", total.seconds()}};
+  write_json(document, arguments.common.json);
+}
+
+SurveyMotionOptions motion_options(const Arguments& arguments) {
+  return {.by = arguments.to == "positions" ? SurveyTies::positions
+                : arguments.to == "control" ? SurveyTies::control
+                                            : SurveyTies::all,
+          .rigid = arguments.rigid};
+}
+
+int run_to_survey(const Arguments& arguments, Interrupt& interrupt, const Timer& total) {
+  InputFile model = read_file(arguments.in, {.hash = !arguments.common.json.empty()}).value();
+  const Json input = arguments.common.json.empty() ? Json() : input_json(arguments.in, model);
+  const std::string counts = counts_text(model.problem);
+  const Constraints constraints = read_constraints(arguments.constraints);
+  const Survey survey =
+      move_to_survey(model.problem, constraints, motion_options(arguments)).value();
+  const SurveyReport report = finish_survey(model.problem, survey);
+  const Written written = write_moved(arguments, model.problem, interrupt);
+  const std::string frame = write_frame(survey, written.format, arguments.out);
+  const std::string& residuals = arguments.constraints.residuals;
+  if (!residuals.empty()) write_residuals(report, residuals);
+  fmt::print("{}: {}\n{}{}", arguments.in, counts, survey_text(survey), residuals_text(report));
+  for (const std::string& path : {frame, residuals})
+    if (!path.empty()) fmt::print("wrote       {}\n", path);
+  finish(arguments, written, model.problem, model.read_s, total,
+         document_of(survey, report, input));
+  return 0;
+}
+
+int run_to_reference(const Arguments& arguments, Interrupt& interrupt, const Timer& total) {
+  const ReadOptions hash{.hash = !arguments.common.json.empty()};
   InputFile model = read_file(arguments.in, hash).value();
   const InputFile reference = read_file(arguments.reference, hash).value();
   const ModelAlignmentOptions options{
@@ -100,25 +173,31 @@ int run(const Arguments& arguments) {
   const ModelAlignment found = align_models(model.problem, reference.problem, options).value();
   Json document = document_of(arguments, found, model, reference);
   move(model.problem, found.similarity);
-  validate(model.problem).value();
-  const std::string format =
-      arguments.format.empty() ? write_format(model.problem, arguments.out) : arguments.format;
-  interrupt.begin_write();
-  const Timer writing;
-  write(model.problem, arguments.out, {.format = format}).value();
-  const double write_s = writing.seconds();
+  const Written written = write_moved(arguments, model.problem, interrupt);
   print(arguments, found, model.problem, reference.problem);
-  fmt::print("wrote       {} ({})\n", arguments.out, format);
-  print_losses(format, model.problem);
-  if (json.empty()) return 0;
-  document["output"] = {
-      {"path", arguments.out}, {"format", format}, {"bytes", bytes_at(arguments.out)}};
-  document["dropped"] = lost_in(format, model.problem);
-  document["time"] = {{"read_s", model.read_s + reference.read_s},
-                      {"write_s", write_s},
-                      {"total_s", total.seconds()}};
-  write_json(document, json);
+  finish(arguments, written, model.problem, model.read_s + reference.read_s, total,
+         std::move(document));
   return 0;
+}
+
+int run(const Arguments& arguments) {
+  const Timer total;
+  Interrupt interrupt(arguments.common.quiet);
+  const bool by_survey = !arguments.constraints.paths.empty();
+  if (arguments.out.empty()) throw Error(ErrorCode::usage, "where to? --output OUT");
+  if (arguments.reference.empty() == !by_survey)
+    throw Error(ErrorCode::usage, "onto what? --reference MODEL or --constraints FILE");
+  if (!by_survey && !arguments.to.empty())
+    throw Error(ErrorCode::usage, "--to is for --constraints");
+  if (!by_survey && !arguments.constraints.residuals.empty())
+    throw Error(ErrorCode::usage, "--residuals is for --constraints");
+  if (by_survey && arguments.least_squares)
+    throw Error(ErrorCode::usage, "--least-squares is for --reference");
+  check_outputs({{"--output", arguments.out, true},
+                 {"--json", arguments.common.json},
+                 {"--residuals", arguments.constraints.residuals}});
+  return by_survey ? run_to_survey(arguments, interrupt, total)
+                   : run_to_reference(arguments, interrupt, total);
 }
 
 std::vector<BoundOption> options_of(Arguments& a) {
@@ -132,6 +211,12 @@ std::vector<BoundOption> options_of(Arguments& a) {
                {.name = "reference",
                 .placeholder = "MODEL",
                 .help = "the model whose frame and scale it takes: a file or folder"}),
+       F::name(&Arguments::to, {{"positions", "those of images"}, {"control", "control points"}},
+               {.name = "to",
+                .placeholder = "NAME",
+                .nothing = true,
+                .help = "which of --constraints the motion is found by; by default all; the others "
+                        "are only measured"}),
        F::flag(&Arguments::rigid,
                {.name = "rigid", .help = "turn and shift alone: the scale stays as it is"}),
        F::flag(&Arguments::least_squares,
@@ -146,12 +231,14 @@ std::vector<BoundOption> options_of(Arguments& a) {
 Verb align_verb() {
   using F = FieldsOf<Arguments>;
   auto a = std::make_shared<Arguments>();
-  Verb verb{"align", "bring a model into the frame of another one by their common images",
+  Verb verb{"align", "bring a model into the frame of another one, or of a survey",
             "Example:\n  sheaf align problem.txt -o aligned.txt --reference problem.txt\n"
             "\nOnto the model of a survey, whose scale is in metres:\n"
-            "  sheaf align model/ -o placed --reference survey/ --json placed.json"};
+            "  sheaf align model/ -o placed --reference survey/ --json placed.json\n"
+            "\nTo where the GPS of its images says that they were taken, without a solve:\n"
+            "  sheaf align model/ -o placed --to positions --constraints images/"};
   verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
-  verb.options = joined({options_of(*a), options_of(a->common)});
+  verb.options = joined({options_of(*a), options_of(a->constraints, true), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

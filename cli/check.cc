@@ -67,7 +67,7 @@ int run(const Arguments& arguments) {
                places_text(finding, input.problem));
   if (findings.empty()) fmt::print("nothing that looks wrong\n");
   // On a copy: a survey moves the problem, whose findings are of the file.
-  Problem placed = arguments.constraints.path.empty() ? Problem() : input.problem;
+  Problem placed = arguments.constraints.paths.empty() ? Problem() : input.problem;
   const std::optional<Survey> survey = place_survey(arguments.constraints, placed, {});
   if (survey) fmt::print("{}", survey_text(*survey));
   if (json.empty()) return 0;

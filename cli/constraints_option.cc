@@ -5,6 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+
+#include "io/output_file.h"
 
 namespace sheaf {
 namespace {
@@ -102,11 +105,13 @@ Json report_json(const SurveyReport& report) {
 std::vector<BoundOption> options_of(ConstraintsArguments& arguments, bool adjusts) {
   using F = FieldsOf<ConstraintsArguments>;
   std::vector<OptionField<ConstraintsArguments>> fields = {
-      F::text(&ConstraintsArguments::path,
+      F::list(&ConstraintsArguments::paths,
               {.name = "constraints",
                .placeholder = "FILE",
                .help = "positions of images, control and check points, scale bars: survey.json, "
-                       "gcp_list.txt, geo.txt or a CSV (docs/constraints.md)"})};
+                       "gcp_list.txt, geo.txt, ground_control_points.json, a CSV, a database of "
+                       "COLMAP or a folder of images with GPS tags; may be given several times "
+                       "(docs/constraints.md)"})};
   if (adjusts)
     fields.push_back(F::text(&ConstraintsArguments::residuals,
                              {.name = "residuals",
@@ -115,14 +120,20 @@ std::vector<BoundOption> options_of(ConstraintsArguments& arguments, bool adjust
   return bound<ConstraintsArguments>(fields, arguments);
 }
 
+Constraints read_constraints(const ConstraintsArguments& arguments) {
+  return read_constraints(
+             std::vector<std::filesystem::path>(arguments.paths.begin(), arguments.paths.end()))
+      .value();
+}
+
 std::optional<Survey> place_survey(const ConstraintsArguments& arguments, Problem& problem,
                                    const Fixed& fixed) {
-  if (arguments.path.empty()) {
+  if (arguments.paths.empty()) {
     if (!arguments.residuals.empty())
       throw Error(ErrorCode::usage, "--residuals is for --constraints");
     return {};
   }
-  return place_survey(problem, read_constraints(arguments.path).value(), fixed).value();
+  return place_survey(problem, read_constraints(arguments), fixed).value();
 }
 
 std::string survey_text(const Survey& survey) {
@@ -132,8 +143,8 @@ std::string survey_text(const Survey& survey) {
   std::string out = fmt::format(
       "survey      {}: {} of {} positions used, {} control, {} check and {} tie points, {} scale "
       "bars\n            frame {}\n",
-      c.path, used(survey.position_image), c.positions.size(), counts[0], counts[1], counts[2],
-      c.scale_bars.size(), frame_text(survey.frame));
+      fmt::join(c.paths, ", "), used(survey.position_image), c.positions.size(), counts[0],
+      counts[1], counts[2], c.scale_bars.size(), frame_text(survey.frame));
   for (const std::string& words : survey.words) out += fmt::format("            {}\n", words);
   for (const std::string& words : c.notes) out += fmt::format("            {}\n", words);
   for (std::size_t i = 0; i < std::min(survey.unused.size(), kMostShown); ++i)
@@ -142,7 +153,7 @@ std::string survey_text(const Survey& survey) {
     out += fmt::format("            and {} more\n", survey.unused.size() - kMostShown);
   for (std::size_t i = 0; i < std::min(survey.outliers.size(), kMostShown); ++i)
     out +=
-        fmt::format("outlier     {} is {:.4g} off before the solve, {:.3g} sigmas (above {:.3g})\n",
+        fmt::format("outlier     {} is {:.4g} off after the motion, {:.3g} sigmas (above {:.3g})\n",
                     survey.outliers[i].name, survey.outliers[i].distance, survey.outliers[i].sigmas,
                     survey.threshold_sigmas);
   if (survey.outliers.size() > kMostShown)
@@ -171,13 +182,27 @@ Json frame_json(const Survey& survey) {
           {"origin", frame.origin ? three_json(*frame.origin) : Json()}};
 }
 
+std::string write_frame(const Survey& survey, const std::string& format, const std::string& model) {
+  if (!format.starts_with("colmap")) return "";
+  std::string path = (std::filesystem::path(model) / "frame.json").string();
+  write_json(frame_json(survey), path);
+  return path;
+}
+
+void write_residuals(const SurveyReport& report, const std::string& path) {
+  Result<OutputFile> file = OutputFile::create(path, Compression::none);
+  if (!file.ok()) throw file.error();
+  file.value().write(residuals_csv(report));
+  file.value().commit().value();
+}
+
 Json survey_json(const std::optional<Survey>& survey, const SurveyReport* report) {
   if (!survey) return {};
   Json outliers = Json::array();
   for (const SurveyOutlier& o : survey->outliers)
     outliers.push_back(
         {{"name", o.name}, {"distance", number(o.distance)}, {"sigmas", number(o.sigmas)}});
-  return {{"path", survey->constraints.path},
+  return {{"paths", survey->constraints.paths},
           {"frame", frame_json(*survey)},
           {"positions", used(survey->position_image)},
           {"moved", survey->moved},

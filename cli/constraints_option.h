@@ -14,11 +14,14 @@ namespace sheaf {
 
 /// --constraints of the verbs that know a survey.
 struct ConstraintsArguments {
-  std::string path;       ///< of the survey; empty: none
-  std::string residuals;  ///< CSV that is written; empty: none
+  std::vector<std::string> paths;  ///< of the survey; empty: none
+  std::string residuals;           ///< CSV that is written; empty: none
 };
 /// With --residuals for a verb that adjusts.
 std::vector<BoundOption> options_of(ConstraintsArguments& arguments, bool adjusts);
+
+/// What the option names, as one survey. Throws Error.
+Constraints read_constraints(const ConstraintsArguments& arguments);
 
 /// Reads the survey and brings the problem into its frame, with all that it adds; nothing without
 /// the option. Throws Error.
@@ -35,5 +38,11 @@ Json survey_json(const std::optional<Survey>& survey, const SurveyReport* report
 
 /// What leads from the local frame that a model is written in back to the survey's coordinates.
 Json frame_json(const Survey& survey);
+
+/// The same as frame.json in the folder of a COLMAP model; the path of the file, or "" beside
+/// formats that are one file. Throws Error.
+std::string write_frame(const Survey& survey, const std::string& format, const std::string& model);
+/// Residuals as CSV. Throws Error.
+void write_residuals(const SurveyReport& report, const std::string& path);
 
 }  // namespace sheaf

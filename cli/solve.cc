@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -93,13 +92,14 @@ std::vector<std::string> write_results(const Arguments& arguments, const SurveyW
   if (!arguments.out.empty()) {
     write(after, arguments.out).value();
     written.push_back(arguments.out);
-    if (work.survey && write_format(after, arguments.out).starts_with("colmap")) {
-      written.push_back((std::filesystem::path(arguments.out) / "frame.json").string());
-      write_json(frame_json(*work.survey), written.back());
-    }
+    if (work.survey)
+      if (std::string frame =
+              write_frame(*work.survey, write_format(after, arguments.out), arguments.out);
+          !frame.empty())
+        written.push_back(std::move(frame));
   }
   if (!arguments.constraints.residuals.empty()) {
-    write_text(residuals_csv(work.report), arguments.constraints.residuals);
+    write_residuals(work.report, arguments.constraints.residuals);
     written.push_back(arguments.constraints.residuals);
   }
   if (!arguments.ply.empty()) {

@@ -44,7 +44,8 @@ struct ImagePosition {
   Covariance3 covariance = kUnitCovariance3;  ///< of the local frame's axes, its unit squared
   std::array<double, 3> lever_arm{};          ///< in the camera's frame, unit of the local frame
   TermLoss loss{};
-  std::uint64_t line = 0;  ///< of the file
+  std::uint64_t line = 0;  ///< of the file, from 1; 0: a file without lines
+  std::uint32_t file = 0;  ///< of Constraints::paths
 };
 
 /// How an image was turned.
@@ -54,6 +55,7 @@ struct ImageRotation {
   Covariance3 covariance = kUnitCovariance3;   ///< rad^2, in the camera's frame
   TermLoss loss{};
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
 };
 
 /// Where down is in an image.
@@ -63,6 +65,7 @@ struct ImageGravity {
   double sigma_rad = 1;
   TermLoss loss{};
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
 };
 
 /// Where a point of the survey is in an image.
@@ -71,6 +74,10 @@ struct SurveyMark {
   std::array<double, 2> pixel{};  ///< as the model counts pixels
   double sigma_px = 1;
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
+  /// `pixel` counts from the middle of the image, in its longer side; `place_survey` multiplies by
+  /// the size that the model has of the image.
+  bool normalised = false;
 };
 
 enum class SurveyRole : std::uint8_t {
@@ -87,6 +94,7 @@ struct SurveyPoint {
   std::optional<std::uint64_t> model_point;  ///< id of the model's point that it is
   std::vector<SurveyMark> marks;
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
 };
 
 /// A known distance between two points of the survey.
@@ -95,6 +103,7 @@ struct ScaleBar {
   double distance = 0, sigma = 1;  ///< unit of the local frame
   TermLoss loss{};
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
 };
 
 /// A parameter of the lens of an image: measured, kept between bounds, or both.
@@ -107,11 +116,12 @@ struct LensValue {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
   std::uint64_t line = 0;
+  std::uint32_t file = 0;
 };
 
 /// What a survey knows of a scene, by names.
 struct Constraints {
-  std::string path;  ///< of the file, for messages
+  std::vector<std::string> paths;  ///< of the files, for messages
   WorldFrame frame;
   std::vector<ImagePosition> positions;
   std::vector<ImageRotation> rotations;
@@ -122,10 +132,15 @@ struct Constraints {
   std::vector<std::string> notes;  ///< sentences about what of the file is not used
 };
 
-/// Reads survey.json, a gcp_list.txt or geo.txt of OpenDroneMap, or a CSV of positions with
-/// accuracies; the content tells which (docs/constraints.md). Errors: unreadable_input with file,
-/// line, what was found, what was expected.
+/// Reads survey.json, a gcp_list.txt or geo.txt of OpenDroneMap, a ground_control_points.json of
+/// OpenSfM, a CSV of positions with accuracies, a database of COLMAP (its pose_priors), or the GPS
+/// tags of a JPEG or of those in a folder; the content tells which (docs/constraints.md). Errors:
+/// unreadable_input with file, line, what was found, what was expected.
 Result<Constraints> read_constraints(const std::filesystem::path& path);
+/// Several as one: their frames are of one kind and name, and no image has two positions, no point
+/// two entries. Errors: likewise, naming both files.
+Result<Constraints> read_constraints(const std::vector<std::filesystem::path>& paths);
+/// What is text of these.
 Result<Constraints> parse_constraints(const std::string& text, const std::string& name);
 
 /// A position or control point that the motion of the model leaves far from its coordinates.
@@ -140,16 +155,19 @@ struct Survey {
   static constexpr std::uint32_t kNone = 0xffffffff;
 
   Constraints constraints;
-  WorldFrame frame;                           ///< with its origin
-  std::vector<std::uint32_t> position_image;  ///< of each position, or kNone: not used
-  std::vector<std::uint32_t> point;           ///< of each point in the problem, or kNone
-  bool moved = false;                         ///< a motion was applied: to all of the problem
-  bool rigid = false;                         ///< and it left the scale as it was
-  double scale = 1;                           ///< of that motion
-  std::vector<SurveyOutlier> outliers;        ///< after the motion, worst first
-  double threshold_sigmas = 0;                ///< beyond which these are
-  std::vector<std::string> words;             ///< sentences about what was done
-  std::vector<std::string> unused;            ///< FILE:LINE: what is not used and why
+  WorldFrame frame;                            ///< with its origin
+  std::vector<std::uint32_t> position_image;   ///< of each position, or kNone: not used
+  std::vector<std::uint32_t> point;            ///< of each point in the problem, or kNone
+  bool moved = false;                          ///< a motion was applied: to all of the problem
+  bool rigid = false;                          ///< and it left the scale as it was
+  double scale = 1;                            ///< of that motion, X -> scale R X + translation
+  std::array<double, 4> rotation{1, 0, 0, 0};  ///< w, x, y, z
+  std::array<double, 3> translation{};
+  std::uint64_t ties = 0;               ///< positions and control points that it was found by
+  std::vector<SurveyOutlier> outliers;  ///< after the motion, worst first
+  double threshold_sigmas = 0;          ///< beyond which these are
+  std::vector<std::string> words;       ///< sentences about what was done
+  std::vector<std::string> unused;      ///< FILE:LINE: what is not used and why
 
   /// What the problem was before points and terms were added.
   std::uint64_t own_points = 0, own_observations = 0;
@@ -164,6 +182,19 @@ struct Survey {
 /// and the problem is then as it was.
 Result<Survey> place_survey(Problem& problem, const Constraints& constraints,
                             const Fixed& fixed = {});
+
+/// What the motion into a survey's frame is found by.
+enum class SurveyTies : std::uint8_t { all, positions, control };
+
+struct SurveyMotionOptions {
+  SurveyTies by = SurveyTies::all;
+  bool rigid = false;  ///< the scale stays as it is
+};
+
+/// As `place_survey`, where nothing is adjusted: the motion alone, which must be determined. What
+/// it is not found by is only measured. Errors: likewise.
+Result<Survey> move_to_survey(Problem& problem, const Constraints& constraints,
+                              const SurveyMotionOptions& options = {});
 
 /// |residual / sigma| beyond which a blunder is named: of a normal error once in a thousand.
 inline constexpr double kBlunderSigmas = 3.29;

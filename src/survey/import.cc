@@ -15,7 +15,7 @@ namespace {
 
 // What the programs that read these files suppose where they state nothing, metres.
 constexpr double kControlSigma = 0.01, kControlHeightSigma = 0.1, kPositionSigma = 3;
-// OpenSfM counts whole numbers at the middle of pixels, models count them at their corners.
+// OpenSfM's pixel coordinates are (0, 0) in the middle of the first pixel, (0.5, 0.5) of models.
 constexpr double kPixelMiddle = 0.5;
 
 std::string lower(std::string_view text) {
@@ -47,11 +47,17 @@ Result<WorldFrame> read_frame_line(LineCursor& lines) {
   return frame;
 }
 
-/// x y z as these files have them: longitude first.
-bool read_place(LineCursor& lines, const WorldFrame& frame, std::array<double, 3>& at) {
-  for (double& x : at)
-    if (!lines.read_real(x)) return false;
+/// x y z as these files have them: longitude first. A height of NaN is not known.
+bool read_place(LineCursor& lines, const WorldFrame& frame, std::array<double, 3>& at,
+                bool& height_known) {
+  if (!lines.read_real(at[0]) || !lines.read_real(at[1])) return false;
   if (frame.kind == WorldKind::geodetic) std::swap(at[0], at[1]);
+  LineCursor as_word = lines;
+  std::string_view word;
+  height_known = !(as_word.read_word(word) && lower(word) == "nan");
+  if (height_known) return lines.read_real(at[2]);
+  lines = as_word;
+  at[2] = 0;
   return true;
 }
 bool on_earth(const WorldFrame& frame, const std::array<double, 3>& at) {
@@ -144,7 +150,7 @@ std::optional<Column> column_named(const std::string& field) {
 class TableReading {
  public:
   TableReading(const std::string& text, const std::string& name) : lines_(text, name) {
-    out_.path = name;
+    out_.paths = {name};
   }
 
   Result<Constraints> run() {
@@ -229,7 +235,7 @@ Result<Constraints> parse_gcp_list(const std::string& text, const std::string& n
   const Result<WorldFrame> frame = read_frame_line(lines);
   if (!frame.ok()) return frame.error();
   Constraints out;
-  out.path = name;
+  out.paths = {name};
   out.frame = frame.value();
   std::map<std::string, std::size_t> by_id;
   std::map<std::array<double, 3>, std::string> id_of_place;
@@ -238,7 +244,8 @@ Result<Constraints> parse_gcp_list(const std::string& text, const std::string& n
     SurveyMark mark;
     mark.line = lines.line_number();
     std::string_view image, id;
-    if (!read_place(lines, out.frame, at) || !lines.read_real(mark.pixel[0]) ||
+    bool height_known = true;
+    if (!read_place(lines, out.frame, at, height_known) || !lines.read_real(mark.pixel[0]) ||
         !lines.read_real(mark.pixel[1]))
       return lines.refuse("x y z, then a pixel x y: finite numbers");
     if (!on_earth(out.frame, at)) return lines.refuse_as(kOnEarth);
@@ -255,7 +262,8 @@ Result<Constraints> parse_gcp_list(const std::string& text, const std::string& n
       SurveyPoint& point = out.points.emplace_back();
       point.id = key;
       point.at = at;
-      point.sigma = {kControlSigma, kControlSigma, kControlHeightSigma};
+      point.sigma = {kControlSigma, kControlSigma,
+                     height_known ? kControlHeightSigma : kUnknownHeightSigma};
       point.line = lines.line_number();
     } else if (out.points[found->second].at != at) {
       return lines.refuse_as("found other coordinates of point " + sheaf::quoted(key) +
@@ -272,7 +280,7 @@ Result<Constraints> parse_geo_txt(const std::string& text, const std::string& na
   const Result<WorldFrame> frame = read_frame_line(lines);
   if (!frame.ok()) return frame.error();
   Constraints out;
-  out.path = name;
+  out.paths = {name};
   out.frame = frame.value();
   bool angles = false;
   while (lines.next_record()) {
@@ -281,7 +289,9 @@ Result<Constraints> parse_geo_txt(const std::string& text, const std::string& na
     std::string_view image;
     if (!lines.read_word(image)) return lines.refuse("the name of an image");
     p.image = std::string(image);
-    if (!read_place(lines, out.frame, p.at)) return lines.refuse("three finite coordinates");
+    bool height_known = true;
+    if (!read_place(lines, out.frame, p.at, height_known))
+      return lines.refuse("three finite coordinates");
     if (!on_earth(out.frame, p.at)) return lines.refuse_as(kOnEarth);
     double angle = 0, horizontal = kPositionSigma, vertical = kPositionSigma;
     for (int k = 0; k < 3 && !lines.line_ended(); ++k) {
@@ -293,7 +303,7 @@ Result<Constraints> parse_geo_txt(const std::string& text, const std::string& na
           !(vertical > 0))
         return lines.refuse("a horizontal and a vertical accuracy above 0, metres");
     }
-    p.covariance = diagonal(horizontal, vertical);
+    p.covariance = diagonal(horizontal, height_known ? vertical : kUnknownHeightSigma);
     out.positions.push_back(p);
   }
   if (angles) out.notes.push_back("angles of geo.txt are not used");

@@ -9,6 +9,7 @@
 #include "io/line_cursor.h"
 #include "scene/rigs.h"
 #include "starts/sights.h"
+#include "survey/file_place.h"
 #include "survey/image_names.h"
 #include "survey/motion.h"
 #include "survey/survey_terms.h"
@@ -30,11 +31,19 @@ std::string counted(std::size_t n, const std::string& what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
+/// How a survey is brought to a problem.
+struct Manner {
+  SurveyTies by = SurveyTies::all;
+  bool rigid = false;
+  bool must_move = false;  ///< where the motion is not determined, that is an error
+};
+
 /// Brings a problem and a survey together, step by step; the problem changes in the last one.
 class Placing {
  public:
-  Placing(Problem& problem, const Constraints& constraints, const Fixed& fixed)
-      : problem_(problem), constraints_(constraints), fixed_(fixed), names_(problem) {
+  Placing(Problem& problem, const Constraints& constraints, const Fixed& fixed,
+          const Manner& manner)
+      : problem_(problem), fixed_(fixed), manner_(manner), names_(problem) {
     out_.constraints = constraints;
     out_.frame = constraints.frame;
   }
@@ -43,7 +52,8 @@ class Placing {
     if (!problem_.terms.empty())
       return Error(ErrorCode::usage, "the problem has terms already: it can take no survey");
     place_images(problem_);
-    find_positions();
+    if (auto e = find_positions()) return *e;
+    count_marks_in_pixels();
     find_points();
     choose_origin();
     collect_ties();
@@ -55,23 +65,58 @@ class Placing {
     add_points();
     add_survey_points(terms.value());
     problem_.terms = std::move(terms).value();
-    start_within_bounds();
+    if (!manner_.must_move) start_within_bounds();
     out_.metadata = std::move(problem_.metadata);
     problem_.metadata = nullptr;
     return std::move(out_);
   }
 
  private:
-  void leave_out(std::uint64_t line, const std::string& what) {
-    out_.unused.push_back(constraints_.path + ":" + std::to_string(line) + ": " + what);
+  template <class Entry>
+  void leave_out(const Entry& entry, const std::string& what) {
+    out_.unused.push_back(place_of(constraints_, entry) + ": " + what);
   }
 
-  void find_positions() {
+  /// Two names may mean one image: with its folder and without.
+  std::optional<Error> find_positions() {
+    std::map<std::uint32_t, const ImagePosition*> seen;
     for (const ImagePosition& p : constraints_.positions) {
       out_.position_image.push_back(names_.find(p.image));
-      if (out_.position_image.back() == Survey::kNone)
-        leave_out(p.line, "the model has no image " + sheaf::quoted(p.image));
+      if (out_.position_image.back() == Survey::kNone) {
+        leave_out(p, "the model has no image " + sheaf::quoted(p.image));
+        continue;
+      }
+      const auto [at, is_new] = seen.try_emplace(out_.position_image.back(), &p);
+      if (!is_new)
+        return Error(ErrorCode::unreadable_input,
+                     place_of(constraints_, p) + ": found a second position of the image " +
+                         sheaf::quoted(p.image) + " of the model, expected one (" +
+                         place_beside(constraints_, *at->second, p) + ", of " +
+                         sheaf::quoted(at->second->image) + ")");
     }
+    return {};
+  }
+
+  /// Marks that count in the size of their image, from its middle.
+  void count_marks_in_pixels() {
+    for (SurveyPoint& point : out_.constraints.points)
+      std::erase_if(point.marks, [&](SurveyMark& mark) {
+        const std::uint32_t image = mark.normalised ? names_.find(mark.image) : Survey::kNone;
+        if (image == Survey::kNone) return false;
+        const Camera& camera = problem_.cameras[problem_.image_camera[image]];
+        if (camera.width_px == 0 || camera.height_px == 0) {
+          leave_out(mark, "the mark of point " + sheaf::quoted(point.id) + " in image " +
+                              sheaf::quoted(mark.image) +
+                              " counts in the size of the image, which the model does not have");
+          return true;
+        }
+        const double width = static_cast<double>(camera.width_px);
+        const double height = static_cast<double>(camera.height_px);
+        const double longer = std::max(width, height);
+        mark.pixel = {width / 2 + longer * mark.pixel[0], height / 2 + longer * mark.pixel[1]};
+        mark.normalised = false;
+        return false;
+      });
   }
 
   std::uint32_t model_point(const SurveyPoint& point) {
@@ -89,10 +134,10 @@ class Placing {
     for (const SurveyMark& mark : point.marks) {
       const std::uint32_t image = names_.find(mark.image);
       if (image == Survey::kNone) {
-        leave_out(mark.line, "the model has no image " + sheaf::quoted(mark.image) +
-                                 ", which has a mark "
-                                 "of point " +
-                                 sheaf::quoted(point.id));
+        leave_out(mark, "the model has no image " + sheaf::quoted(mark.image) +
+                            ", which has a mark "
+                            "of point " +
+                            sheaf::quoted(point.id));
       } else {
         out.push_back({image, mark.pixel});
       }
@@ -111,19 +156,19 @@ class Placing {
       if (point.model_point) {
         const std::uint32_t own = out_.point[i] = model_point(point);
         if (own == Survey::kNone) {
-          leave_out(point.line, "the model has no point " + std::to_string(*point.model_point) +
-                                    ", which point " + sheaf::quoted(point.id) + " is to be");
+          leave_out(point, "the model has no point " + std::to_string(*point.model_point) +
+                               ", which point " + sheaf::quoted(point.id) + " is to be");
         } else {
           const double* X = &problem_.points[3 * std::size_t(own)];
           places_[i] = {X[0], X[1], X[2]};
         }
       } else if (sightings[i].size() < 2) {
-        leave_out(point.line, "point " + sheaf::quoted(point.id) + " has " +
-                                  counted(sightings[i].size(), "mark") +
-                                  " in images of the model, and needs two");
+        leave_out(point, "point " + sheaf::quoted(point.id) + " has " +
+                             counted(sightings[i].size(), "mark") +
+                             " in images of the model, and needs two");
       } else if (!places_[i]) {
-        leave_out(point.line, "the rays of the marks of point " + sheaf::quoted(point.id) +
-                                  " meet nowhere in front of their cameras");
+        leave_out(point, "the rays of the marks of point " + sheaf::quoted(point.id) +
+                             " meet nowhere in front of their cameras");
       }
     }
   }
@@ -144,7 +189,7 @@ class Placing {
 
   void collect_ties() {
     for (std::size_t i = 0; i < constraints_.positions.size(); ++i) {
-      if (out_.position_image[i] == Survey::kNone) continue;
+      if (out_.position_image[i] == Survey::kNone || manner_.by == SurveyTies::control) continue;
       const ImagePosition& p = constraints_.positions[i];
       const Pose& pose = problem_.poses[out_.position_image[i]];
       const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
@@ -155,6 +200,7 @@ class Placing {
     for (std::size_t i = 0; i < constraints_.points.size(); ++i) {
       const SurveyPoint& point = constraints_.points[i];
       if (!places_[i] || point.role != SurveyRole::control) continue;
+      if (manner_.by == SurveyTies::positions) continue;
       ties_.push_back({"control point " + sheaf::quoted(point.id),
                        *places_[i],
                        {},
@@ -167,28 +213,36 @@ class Placing {
   std::optional<Error> used_at_all() const {
     const std::size_t others = constraints_.rotations.size() + constraints_.gravities.size() +
                                constraints_.lenses.size() + constraints_.scale_bars.size();
-    if (!ties_.empty() || others > 0) return {};
+    if (!ties_.empty() || others > 0 || manner_.must_move) return {};
     std::string why = "it states neither positions nor control points";
     if (!out_.unused.empty()) why = out_.unused.front();
     return Error(ErrorCode::unreadable_input,
-                 constraints_.path + ": nothing of it can be used with this model; " + why);
+                 paths_of(constraints_) + ": nothing of it can be used with this model; " + why);
   }
 
   bool held() const {
     return fixed_.points || fixed_.poses || !fixed_.pose_ids.empty() || !fixed_.frame_ids.empty();
   }
   std::string ties_text() const {
+    if (manner_.by == SurveyTies::positions) return counted(positions_, "position");
+    if (manner_.by == SurveyTies::control) return counted(control_, "control point");
     return counted(positions_, "position") + " and " + counted(control_, "control point");
   }
 
   std::optional<Error> find_motion() {
+    if (manner_.must_move && ties_.size() < kLeastTies)
+      return Error(ErrorCode::unreadable_input,
+                   paths_of(constraints_) + ": found " + ties_text() +
+                       " that can be used, expected three: by fewer it is not determined how the "
+                       "model is turned and scaled" +
+                       (out_.unused.empty() ? "" : "; " + out_.unused.front()));
     if (ties_.empty()) return {};
-    const bool in_place = median_sigmas(ties_, {}) <= kInPlaceSigmas;
+    const bool in_place = !manner_.must_move && median_sigmas(ties_, {}) <= kInPlaceSigmas;
     if (held()) {
       if (in_place)
         return out_.words.push_back("poses or points are held: the model stays"), std::nullopt;
       return Error(ErrorCode::usage,
-                   constraints_.path + ": the model is not in the frame of its coordinates (" +
+                   paths_of(constraints_) + ": the model is not in the frame of its coordinates (" +
                        ties_text() + " are off by " + figures(median_sigmas(ties_, {})) +
                        " sigmas in the median) and cannot be moved there, since poses or points "
                        "are held: solve without --fix of these first");
@@ -203,15 +257,16 @@ class Placing {
       if (in_place)
         return out_.words.push_back("what is used lies in a line: the model stays"), std::nullopt;
       return Error(ErrorCode::unreadable_input,
-                   constraints_.path + ": " + ties_text() +
+                   paths_of(constraints_) + ": " + ties_text() +
                        " that are used lie in a line: how the "
                        "model is turned about it is not determined; add one beside the line");
     }
-    out_.rigid = !problem_.rigs.empty() && (fixed_.sensors || !fixed_.sensor_ids.empty());
+    out_.rigid =
+        manner_.rigid || (!problem_.rigs.empty() && (fixed_.sensors || !fixed_.sensor_ids.empty()));
     motion_ = motion_of(ties_, out_.rigid);
     if (!(motion_->similarity.scale > 0) || !std::isfinite(motion_->similarity.scale))
       return Error(ErrorCode::unreadable_input,
-                   constraints_.path + ": no motion takes the model to its coordinates");
+                   paths_of(constraints_) + ": no motion takes the model to its coordinates");
     tell_motion();
     return {};
   }
@@ -219,10 +274,13 @@ class Placing {
   void tell_motion() {
     out_.moved = true;
     out_.scale = motion_->similarity.scale;
+    out_.rotation = motion_->similarity.rotation;
+    out_.translation = motion_->similarity.translation;
+    out_.ties = ties_.size();
     out_.outliers = motion_->outliers;
     out_.threshold_sigmas = motion_->threshold_sigmas;
-    out_.words.push_back(out_.rigid ? "sensors are held: the model was turned and shifted to " +
-                                          ties_text()
+    const std::string why = manner_.rigid ? "" : "sensors are held: ";
+    out_.words.push_back(out_.rigid ? why + "the model was turned and shifted to " + ties_text()
                                     : "the model was turned, shifted and scaled by " +
                                           figures(out_.scale) + " to " + ties_text());
   }
@@ -284,8 +342,8 @@ class Placing {
     for (const ScaleBar& bar : constraints_.scale_bars) {
       const std::uint32_t first = points[bar.first], second = points[bar.second];
       if (first == Survey::kNone || second == Survey::kNone) {
-        leave_out(bar.line, "the scale bar from " + sheaf::quoted(bar.first) + " to " +
-                                sheaf::quoted(bar.second) + " has an end that takes no part");
+        leave_out(bar, "the scale bar from " + sheaf::quoted(bar.first) + " to " +
+                           sheaf::quoted(bar.second) + " has an end that takes no part");
         continue;
       }
       terms.distances.push_back({first, second, bar.distance, bar.sigma, bar.loss});
@@ -293,10 +351,11 @@ class Placing {
   }
 
   Problem& problem_;
-  const Constraints& constraints_;
   const Fixed& fixed_;
+  const Manner manner_;
   ImageNames names_;
   Survey out_;
+  const Constraints& constraints_ = out_.constraints;
   std::vector<std::optional<Vector3<double>>> places_;  ///< of points, in the model
   std::vector<SurveyTie> ties_;
   std::size_t positions_ = 0, control_ = 0;
@@ -306,7 +365,13 @@ class Placing {
 }  // namespace
 
 Result<Survey> place_survey(Problem& problem, const Constraints& constraints, const Fixed& fixed) {
-  return Placing(problem, constraints, fixed).run();
+  return Placing(problem, constraints, fixed, {}).run();
+}
+
+Result<Survey> move_to_survey(Problem& problem, const Constraints& constraints,
+                              const SurveyMotionOptions& options) {
+  const Manner manner{options.by, options.rigid, true};
+  return Placing(problem, constraints, {}, manner).run();
 }
 
 }  // namespace sheaf

@@ -1,6 +1,5 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <map>
 #include <string_view>
 
 #include "io/byte_source.h"
@@ -25,87 +24,81 @@ Form form_of(const std::string& text, const std::string& name) {
   double x = 0;
   std::string_view word;
   if (!records.next_record() || !records.next_record()) return Form::geo;
-  if (!records.read_real(x)) return Form::geo;
-  for (int k = 0; k < 4; ++k)
-    if (!records.read_real(x)) return Form::geo;
+  for (int k = 0; k < 5; ++k)
+    if (!(k == 2 ? records.read_word(word) : records.read_real(x))) return Form::geo;
   return records.read_word(word) ? Form::gcp_list : Form::geo;
 }
 
-Error refuse(const Constraints& c, std::uint64_t line, const std::string& words) {
-  return Error(ErrorCode::unreadable_input, c.path + ":" + std::to_string(line) + ": " + words);
+/// Not yet checked: what one file lacks another may have.
+Result<Constraints> parse_any(const std::string& text, const std::string& name) {
+  switch (form_of(text, name)) {
+    case Form::table:
+      return parse_position_table(text, name);
+    case Form::gcp_list:
+      return parse_gcp_list(text, name);
+    case Form::geo:
+      return parse_geo_txt(text, name);
+    case Form::json:
+      break;
+  }
+  const Result<JsonValue> root = parse_json(text, name);
+  if (!root.ok()) return root.error();
+  return is_opensfm_points(root.value()) ? parse_opensfm_points(root.value(), name)
+                                         : parse_survey_json(root.value(), name);
 }
 
-Result<void> check_images(const Constraints& c) {
-  std::map<std::string, std::uint64_t> seen;
-  for (const ImagePosition& p : c.positions)
-    if (const auto [at, is_new] = seen.try_emplace(p.image, p.line); !is_new)
-      return refuse(c, p.line,
-                    "found a second position of image " + sheaf::quoted(p.image) +
-                        ", expected one (line " + std::to_string(at->second) + ")");
-  return {};
+/// The first bytes of a file; of a pipe, which is read once, none.
+Result<std::string> head_of(const std::filesystem::path& path) {
+  constexpr std::size_t kHead = 16;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return std::string();
+  Result<RawBytes> bytes = RawBytes::open(path);
+  if (!bytes.ok()) return bytes.error();
+  std::string out(kHead, '\0');
+  const Result<std::size_t> count = bytes.value().read(out.data(), out.size());
+  if (!count.ok()) return count.error();
+  out.resize(count.value());
+  return out;
 }
 
-Result<void> check_marks(const Constraints& c, const SurveyPoint& point) {
-  std::map<std::string, std::uint64_t> seen;
-  for (const SurveyMark& mark : point.marks)
-    if (const auto [at, is_new] = seen.try_emplace(mark.image, mark.line); !is_new)
-      return refuse(c, mark.line,
-                    "found a second mark of point " + sheaf::quoted(point.id) + " in image " +
-                        sheaf::quoted(mark.image) + ", expected one (line " +
-                        std::to_string(at->second) + ")");
-  return {};
+/// Folders, and files that are not text, are read where they lie.
+Result<Constraints> read_any(const std::filesystem::path& path) {
+  constexpr std::string_view kJpeg = "\xff\xd8\xff", kSqlite{"SQLite format 3\0", 16};
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return read_image_positions(path);
+  const Result<std::string> head = head_of(path);
+  if (!head.ok()) return head.error();
+  if (head.value().starts_with(kJpeg)) return read_image_positions(path);
+  if (head.value() == kSqlite) return read_pose_priors(path);
+  const Result<std::string> text = read_text(path);
+  if (!text.ok()) return text.error();
+  return parse_any(text.value(), path.string());
+}
+
+Result<Constraints> checked(Result<Constraints> read) {
+  if (!read.ok()) return read;
+  if (const Result<void> good = check_constraints(read.value()); !good.ok()) return good.error();
+  return read;
 }
 
 }  // namespace
 
-Result<void> check_constraints(const Constraints& c) {
-  if (Result<void> good = check_images(c); !good.ok()) return good;
-  std::map<std::string, std::uint64_t> points;
-  for (const SurveyPoint& point : c.points) {
-    if (const auto [at, is_new] = points.try_emplace(point.id, point.line); !is_new)
-      return refuse(c, point.line,
-                    "found the id " + sheaf::quoted(point.id) +
-                        " a second time, expected ids of their own (line " +
-                        std::to_string(at->second) + ")");
-    if (Result<void> good = check_marks(c, point); !good.ok()) return good;
-  }
-  for (const ScaleBar& bar : c.scale_bars) {
-    for (const std::string& id : {bar.first, bar.second})
-      if (!points.contains(id))
-        return refuse(c, bar.line,
-                      "found a scale bar at point " + sheaf::quoted(id) +
-                          ", expected the id of one of the points");
-    if (bar.first == bar.second)
-      return refuse(c, bar.line,
-                    "found a scale bar from point " + sheaf::quoted(bar.first) +
-                        " to itself, expected two points");
-  }
-  return {};
-}
-
 Result<Constraints> parse_constraints(const std::string& text, const std::string& name) {
-  Result<Constraints> out = [&] {
-    switch (form_of(text, name)) {
-      case Form::table:
-        return parse_position_table(text, name);
-      case Form::gcp_list:
-        return parse_gcp_list(text, name);
-      case Form::geo:
-        return parse_geo_txt(text, name);
-      case Form::json:
-        break;
-    }
-    return parse_survey_json(text, name);
-  }();
-  if (!out.ok()) return out;
-  if (const Result<void> good = check_constraints(out.value()); !good.ok()) return good.error();
-  return out;
+  return checked(parse_any(text, name));
 }
 
 Result<Constraints> read_constraints(const std::filesystem::path& path) {
-  const Result<std::string> text = read_text(path);
-  if (!text.ok()) return text.error();
-  return parse_constraints(text.value(), path.string());
+  return checked(read_any(path));
+}
+
+Result<Constraints> read_constraints(const std::vector<std::filesystem::path>& paths) {
+  std::vector<Constraints> parts;
+  for (const std::filesystem::path& path : paths) {
+    Result<Constraints> part = read_any(path);
+    if (!part.ok()) return part.error();
+    parts.push_back(std::move(part).value());
+  }
+  return checked(merge_constraints(std::move(parts)));
 }
 
 }  // namespace sheaf

@@ -2,18 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <numbers>
-#include <optional>
-#include <set>
-#include <string_view>
 
 #include "geometry/rotation.h"
-#include "io/json_lines.h"
-#include "io/line_cursor.h"
 #include "options/loss_option.h"
 #include "scene/terms.h"
 #include "survey/constraint_files.h"
+#include "survey/json_reading.h"
 
 namespace sheaf {
 namespace {
@@ -22,10 +17,9 @@ using Kind = JsonValue::Kind;
 
 constexpr double kRadians = std::numbers::pi / 180;
 
-/// Reads a value after another and keeps the first error; what follows it has no meaning.
-class Reading {
+class Reading : JsonReading {
  public:
-  explicit Reading(std::string name) : name_(std::move(name)) { out_.path = name_; }
+  explicit Reading(const std::string& name) : JsonReading(name) { out_.paths = {name}; }
 
   Result<Constraints> run(const JsonValue& root) {
     if (root.kind != Kind::object) return refuse(root, "an object: a survey"), *error_;
@@ -45,84 +39,6 @@ class Reading {
   }
 
  private:
-  void refuse(const JsonValue& found, const std::string& expected) {
-    refuse(found.line, found.shown(), expected);
-  }
-  void refuse(std::uint64_t line, const std::string& found, const std::string& expected) {
-    if (!error_)
-      error_ = Error(ErrorCode::unreadable_input, name_ + ":" + std::to_string(line) + ": found " +
-                                                      found + ", expected " + expected);
-  }
-
-  /// Whether the value is an object whose keys are all known, none of them twice.
-  bool known(const JsonValue& object, const std::string& what,
-             std::initializer_list<std::string_view> keys) {
-    if (object.kind != Kind::object) return refuse(object, what + ": an object"), false;
-    std::set<std::string> seen;
-    for (const auto& [key, value] : object.members) {
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        std::string all;
-        for (const std::string_view k : keys) all += (all.empty() ? "" : ", ") + std::string(k);
-        return refuse(value.line, "the key " + sheaf::quoted(key), "one of " + what + ": " + all),
-               false;
-      }
-      if (!seen.insert(key).second)
-        return refuse(value.line, "the key " + sheaf::quoted(key) + " twice", "it once"), false;
-    }
-    return true;
-  }
-  template <class Read>
-  void each(const JsonValue& root, const std::string& key, Read read) {
-    const JsonValue* list = root.find(key);
-    if (list == nullptr) return;
-    if (list->kind != Kind::list) return refuse(*list, "\"" + key + "\": a list");
-    for (const JsonValue& value : list->items)
-      if (!error_) read(value);
-  }
-
-  const JsonValue* need(const JsonValue& object, const std::string& key) {
-    const JsonValue* value = object.find(key);
-    if (value == nullptr) refuse(object.line, "no \"" + key + "\"", "one in this object");
-    return value;
-  }
-  std::string text(const JsonValue& object, const std::string& key) {
-    const JsonValue* value = need(object, key);
-    if (value == nullptr) return {};
-    if (value->kind != Kind::text || value->text.empty())
-      refuse(*value, "\"" + key + "\": a text that is not empty");
-    return value->text;
-  }
-  /// An id or a name may be a number too.
-  std::string name(const JsonValue& object, const std::string& key) {
-    const JsonValue* value = need(object, key);
-    if (value == nullptr) return {};
-    return value->kind == Kind::number ? value->shown() : text(object, key);
-  }
-  double number(const JsonValue& object, const std::string& key) {
-    const JsonValue* value = need(object, key);
-    if (value == nullptr) return 0;
-    if (value->kind != Kind::number || !std::isfinite(value->number))
-      refuse(*value, "\"" + key + "\": a finite number");
-    return value->number;
-  }
-  double above_zero(const JsonValue& object, const std::string& key) {
-    const double x = number(object, key);
-    if (!error_ && !(x > 0)) refuse(*object.find(key), "\"" + key + "\" above 0");
-    return x;
-  }
-  template <std::size_t kCount>
-  std::array<double, kCount> numbers(const JsonValue& list, const std::string& key) {
-    std::array<double, kCount> out{};
-    const std::string expected =
-        "\"" + key + "\": a list of " + std::to_string(kCount) + " finite numbers";
-    if (list.kind != Kind::list || list.items.size() != kCount) return refuse(list, expected), out;
-    for (std::size_t k = 0; k < kCount; ++k) {
-      if (list.items[k].kind != Kind::number || !std::isfinite(list.items[k].number))
-        refuse(list.items[k], expected);
-      out[k] = list.items[k].number;
-    }
-    return out;
-  }
   /// One number for all axes, or one for each.
   std::array<double, 3> sigmas(const JsonValue& object, const std::string& key) {
     const JsonValue* value = need(object, key);
@@ -319,18 +235,14 @@ class Reading {
     lens.loss = loss(v, "loss", {});
   }
 
-  std::string name_;
   Constraints out_;
   TermLoss position_loss_{};
-  std::optional<Error> error_;
 };
 
 }  // namespace
 
-Result<Constraints> parse_survey_json(const std::string& text, const std::string& name) {
-  const Result<JsonValue> root = parse_json(text, name);
-  if (!root.ok()) return root.error();
-  return Reading(name).run(root.value());
+Result<Constraints> parse_survey_json(const JsonValue& root, const std::string& name) {
+  return Reading(name).run(root);
 }
 
 }  // namespace sheaf

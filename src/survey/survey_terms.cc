@@ -7,12 +7,14 @@
 #include <map>
 
 #include "io/line_cursor.h"
+#include "survey/file_place.h"
 
 namespace sheaf {
 namespace {
 
-std::string at_line(const Survey& survey, std::uint64_t line) {
-  return survey.constraints.path + ":" + std::to_string(line) + ": ";
+template <class Entry>
+std::string at(const Survey& survey, const Entry& entry) {
+  return place_of(survey.constraints, entry) + ": ";
 }
 
 /// The image of something that names one, or kNone and a sentence among the unused.
@@ -20,7 +22,7 @@ template <class Named>
 std::uint32_t image_of(const Named& named, Survey& survey, const ImageNames& names) {
   const std::uint32_t image = names.find(named.image);
   if (image == Survey::kNone)
-    survey.unused.push_back(at_line(survey, named.line) + "the model has no image " +
+    survey.unused.push_back(at(survey, named) + "the model has no image " +
                             sheaf::quoted(named.image));
   return image;
 }
@@ -33,7 +35,7 @@ Result<void> add_lens(const Problem& problem, const LensValue& lens, std::uint32
   if (found == names.end()) {
     std::string all;
     for (const std::string_view name : names) all += (all.empty() ? "" : ", ") + std::string(name);
-    return Error(ErrorCode::unreadable_input, at_line(survey, lens.line) + "found the parameter " +
+    return Error(ErrorCode::unreadable_input, at(survey, lens) + "found the parameter " +
                                                   sheaf::quoted(lens.parameter) +
                                                   ", expected one that the lens of image " +
                                                   sheaf::quoted(lens.image) + " has: " + all);
@@ -45,23 +47,22 @@ Result<void> add_lens(const Problem& problem, const LensValue& lens, std::uint32
   for (const ParameterBound& bound : terms.bounds)
     if (bound.camera == camera && bound.parameter == parameter)
       return Error(ErrorCode::unreadable_input,
-                   at_line(survey, lens.line) + "found bounds of " + lens.parameter +
+                   at(survey, lens) + "found bounds of " + lens.parameter +
                        " of a lens that has them already, expected them once for all its images");
   terms.bounds.push_back({camera, parameter, lens.lower, lens.upper});
   return {};
 }
 
 Result<void> check_model_points(const Survey& survey) {
-  std::map<std::uint64_t, std::uint64_t> lines;
+  std::map<std::uint64_t, const SurveyPoint*> seen;
   for (const SurveyPoint& point : survey.constraints.points) {
     if (!point.model_point) continue;
-    const auto [at, is_new] = lines.try_emplace(*point.model_point, point.line);
+    const auto [found, is_new] = seen.try_emplace(*point.model_point, &point);
     if (!is_new)
-      return Error(ErrorCode::unreadable_input, at_line(survey, point.line) +
-                                                    "found the model's point " +
-                                                    std::to_string(*point.model_point) +
-                                                    " a second time, expected it once (line " +
-                                                    std::to_string(at->second) + ")");
+      return Error(ErrorCode::unreadable_input,
+                   at(survey, point) + "found the model's point " +
+                       std::to_string(*point.model_point) + " a second time, expected it once (" +
+                       place_beside(survey.constraints, *found->second, point) + ")");
   }
   return {};
 }

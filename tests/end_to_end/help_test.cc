@@ -89,14 +89,14 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
                     "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses"});
   if (verb == "info" || verb == "convert" || verb == "solve") options.insert("--rigs");
-  if (verb == "check" || verb == "solve") options.insert("--constraints");
-  if (verb == "solve") options.insert("--residuals");
+  if (verb == "check" || verb == "solve" || verb == "align") options.insert("--constraints");
+  if (verb == "solve" || verb == "align") options.insert("--residuals");
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
                     "--min-track"});
   if (verb == "align")
-    options.insert({"--output", "--reference", "--rigid", "--least-squares", "--format"});
+    options.insert({"--output", "--reference", "--to", "--rigid", "--least-squares", "--format"});
   if (verb == "evaluate") options.insert({"--no-align", "--robust", "--csv"});
   if (verb == "perturb")
     options.insert({"--rotation", "--translation", "--center", "--point", "--intrinsics", "--pixel",

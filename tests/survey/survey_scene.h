@@ -47,7 +47,7 @@ struct SurveyScene {
 
   Constraints frame() const {
     Constraints out;
-    out.path = "survey.json";
+    out.paths = {"survey.json"};
     out.frame.kind = WorldKind::projected;
     return out;
   }
