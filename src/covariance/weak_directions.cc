@@ -11,13 +11,34 @@
 #include <utility>
 
 #include "geometry/camera_model.h"
+#include "starts/bearing.h"
 #include "starts/sights.h"
 
 namespace sheaf {
 namespace {
 
-/// The farthest that a unit of each parameter moves an observed pixel.
+/// The farthest that a unit of each parameter moves a pixel: an observed one, or a corner of the
+/// image, which lies where the lens without its distortion has it.
 using Reach = std::array<double, kMaxCameraParameters>;
+
+void widen(const Camera& camera, const Vector3<double>& P, Reach& reach) {
+  const LensJacobian<double> lens = project_with_jacobian(camera, P);
+  for (std::size_t p = 0; p < parameter_count(camera.model); ++p)
+    if (const double moved = std::hypot(lens.parameters[0][p], lens.parameters[1][p]);
+        std::isfinite(moved))
+      reach[p] = std::max(reach[p], moved);
+}
+
+void widen_to_corners(const Camera& camera, Reach& reach) {
+  if (camera.width_px == 0 || camera.height_px == 0) return;
+  const Camera plain = without_distortion(camera);
+  for (const double x : {0.0, static_cast<double>(camera.width_px)})
+    for (const double y : {0.0, static_cast<double>(camera.height_px)}) {
+      const double corner[] = {x, y};
+      if (const auto ray = bearing(plain, corner)) widen(plain, *ray, reach);
+    }
+}
+
 std::vector<Reach> reach_of(const Problem& problem) {
   std::vector<Reach> out(problem.cameras.size(), Reach{});
   std::vector<Matrix3<double>> R;
@@ -26,12 +47,9 @@ std::vector<Reach> reach_of(const Problem& problem) {
     const std::uint32_t image = problem.observation_image[i];
     const std::uint32_t camera = problem.image_camera[image];
     const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
-    const LensJacobian<double> lens = project_with_jacobian(
-        problem.cameras[camera], in_camera(R[image], problem.poses[image], X));
-    for (std::size_t p = 0; p < parameter_count(problem.cameras[camera].model); ++p)
-      out[camera][p] =
-          std::max(out[camera][p], std::hypot(lens.parameters[0][p], lens.parameters[1][p]));
+    widen(problem.cameras[camera], in_camera(R[image], problem.poses[image], X), out[camera]);
   }
+  for (std::size_t c = 0; c < out.size(); ++c) widen_to_corners(problem.cameras[c], out[c]);
   return out;
 }
 
