@@ -176,5 +176,71 @@ TEST(Covariance, IsTheDenseInverseWithTheTraceOverPoints) {
   expect_book(unrigged(CameraModel::opencv), {}, {}, Gauge::free_points);
 }
 
+TEST(Covariance, RedundancyNumbersAddUp) {
+  const Problem p = solved(unrigged(CameraModel::opencv));
+  for (const Gauge gauge : {Gauge::free_centres, Gauge::free_points, Gauge::first_two}) {
+    CovarianceOptions options;
+    options.gauge = gauge;
+    options.observations = true;
+    const Covariance c = covariance(p, options).value();
+    double sum = 0;
+    for (const ObservationReliability& o : c.observations)
+      for (const double r : o.redundancy) sum += r;
+    EXPECT_NEAR(sum, c.redundancy, 1e-6 * c.redundancy);
+  }
+}
+
+TEST(Covariance, TheFirstTwoAreExact) {
+  const Problem p = solved(unrigged(CameraModel::opencv));
+  CovarianceOptions options;
+  options.gauge = Gauge::first_two;
+  const Covariance c = covariance(p, options).value();
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_LT(std::sqrt(std::abs(c.poses[0][7 * k])), 1e-7);
+  EXPECT_GT(c.poses[2][0], 1e-8);
+}
+
+TEST(Covariance, BitsDoNotDependOnThreads) {
+  const Problem p = solved(surveyed(scene(CameraModel::opencv)));
+  std::vector<Covariance> all;
+  for (const int threads : {1, 2, 5}) {
+    CovarianceOptions options;
+    options.threads = threads;
+    options.observations = true;
+    all.push_back(covariance(p, options).value());
+    EXPECT_EQ(all.back().poses, all.front().poses);
+    EXPECT_EQ(all.back().points, all.front().points);
+    EXPECT_EQ(all.back().lenses, all.front().lenses);
+  }
+}
+
+TEST(Covariance, WhatIsNotDeterminedIsSaid) {
+  Problem p = solved(unrigged(CameraModel::opencv));
+  const std::uint32_t lone = p.add_point(0.1, 0.2, 0.3);
+  p.add_observation(0, lone, 500, 400);
+  const std::uint32_t blind = p.add_image(p.poses[0], 0u);
+  const Covariance c = covariance(p).value();
+  EXPECT_EQ(c.undetermined_points, 1u);
+  EXPECT_TRUE(std::isinf(c.points[lone][0]));
+  EXPECT_TRUE(std::isinf(c.poses[blind][0]));
+  EXPECT_TRUE(std::isfinite(c.poses[0][0]) && std::isfinite(c.points[0][0]));
+}
+
+TEST(Covariance, WhatMakesNoSenseIsRefused) {
+  const Problem p = unrigged(CameraModel::opencv);
+  const auto words = [&](const CovarianceOptions& options) {
+    const Result<Covariance> c = covariance(p, options);
+    return c.ok() ? std::string() : std::string(c.error().what());
+  };
+  CovarianceOptions data, sigma, ids, loss;
+  data.gauge = Gauge::data;
+  sigma.sigma = -1;
+  ids.point_ids = {999};
+  loss.loss = {LossKind::huber, 0};
+  EXPECT_NE(words(data).find("seven freedoms"), std::string::npos);
+  EXPECT_NE(words(sigma).find("sigma"), std::string::npos);
+  EXPECT_NE(words(ids).find("999"), std::string::npos);
+  EXPECT_NE(words(loss).find("scale"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace sheaf

@@ -91,6 +91,10 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "info" || verb == "convert" || verb == "solve") options.insert("--rigs");
   if (verb == "check" || verb == "solve" || verb == "align") options.insert("--constraints");
   if (verb == "solve" || verb == "align") options.insert("--residuals");
+  if (verb == "covariance")
+    options.insert({"--gauge", "--sigma", "--loss", "--conditional", "--observations", "--points",
+                    "--csv", "--fix", "--refine", "--rigs", "--constraints"});
+  if (verb == "solve") options.insert("--sigmas");
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
@@ -160,7 +164,7 @@ TEST_P(Help, ExampleRuns) {
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
-                                         "align", "photometric", "generate", "demo"),
+                                         "align", "covariance", "photometric", "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
@@ -168,7 +172,7 @@ TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
   for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "align",
-                           "compare", "photometric", "generate", "demo"})
+                           "covariance", "compare", "photometric", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

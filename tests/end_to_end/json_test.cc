@@ -177,6 +177,11 @@ TEST_F(JsonTest, AlignHasTheDocumentedKeys) {
   expect_documented("align", {kShared, "align"});
 }
 
+TEST_F(JsonTest, CovarianceHasTheDocumentedKeys) {
+  ASSERT_EQ(run({"covariance", "in.txt", "--json", "covariance.json"}).exit_code, 0);
+  expect_documented("covariance", {kShared, "covariance"});
+}
+
 TEST_F(JsonTest, CompareHasTheDocumentedKeys) {
   ASSERT_EQ(run({"compare", "in.txt", "--json", "compare.json", "--solvers", "sheaf,nobody",
                  "--reference", "in.txt"})
