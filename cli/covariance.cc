@@ -16,6 +16,7 @@
 #include "json_document.h"
 #include "options/loss_option.h"
 #include "options/refinement.h"
+#include "options/shared_options.h"
 #include "outputs.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
@@ -128,6 +129,7 @@ std::vector<BoundOption> options_of(Arguments& a) {
                                            .help = "of a residual; 0: from the residuals"}),
        loss_field<CovarianceOptions>(&CovarianceOptions::loss, {"pixels", false, false},
                                      {.name = "loss", .help = "that the solve ended with"}),
+       SharedFields<CovarianceOptions>::memory_limit("refuse (exit 5)"),
        C::flag(&CovarianceOptions::conditional,
                {.name = "conditional", .help = "points with cameras held"}),
        C::flag(&CovarianceOptions::observations,

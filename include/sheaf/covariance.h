@@ -34,9 +34,10 @@ struct CovarianceOptions {
   bool conditional = false;  ///< of points with cameras held, and of nothing else
   /// Points to tell of, by index, where not all are wanted.
   std::vector<std::uint32_t> point_ids;
-  bool points = true;         ///< tell of points at all
-  bool observations = false;  ///< redundancy numbers of observations
-  int threads = 0;            ///< 0: as many as the machine offers
+  bool points = true;                    ///< tell of points at all
+  bool observations = false;             ///< redundancy numbers of observations
+  int threads = 0;                       ///< 0: as many as the machine offers
+  std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
 };
 
 /// Row-major; of what is held or not determined every number is 0 or not finite, as said.

@@ -271,7 +271,8 @@ Result<Covariance> covariance(const Problem& given, const CovarianceOptions& opt
     out.sigma_estimated = noise.estimated;
     out.loss_factor = noise.factor;
     out.redundancy = noise.redundancy;
-    const auto inverse = InverseNormal::make(*problem, equations, gauge, weights.value(), threads);
+    const auto inverse = InverseNormal::make(*problem, equations, gauge, weights.value(),
+                                             options.memory_limit_bytes, threads);
     if (!inverse.ok()) return inverse.error();
     Telling(*problem, options, equations, gauge, *inverse.value(), threads, out).run();
     out.weak = weak_directions(*problem, out.lenses);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "eliminate/kernel_table.h"
+#include "platform/memory.h"
 #include "reduced/sparse_cholesky.h"
 
 namespace sheaf {
@@ -17,7 +18,9 @@ namespace {
 constexpr double kRidge = 1e-12, kRidged = 1e-3;
 constexpr double kHopeless = 1e14;
 
-Columns without(const ParameterBlocks& blocks) { return blocks.as_columns(); }
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 999999) / 1000000) + " MB";
+}
 
 }  // namespace
 
@@ -195,11 +198,9 @@ void InverseNormal::take_inverse(const SparseCholesky& cholesky) {
     }
 }
 
-Result<std::unique_ptr<InverseNormal>> InverseNormal::make(const Problem& problem,
-                                                           NormalEquations& equations,
-                                                           const SceneGauge& gauge,
-                                                           const GaugeWeights& weights,
-                                                           Threads& threads) {
+Result<std::unique_ptr<InverseNormal>> InverseNormal::make(
+    const Problem& problem, NormalEquations& equations, const SceneGauge& gauge,
+    const GaugeWeights& weights, std::uint64_t memory_limit_bytes, Threads& threads) {
   std::unique_ptr<InverseNormal> out(new InverseNormal(equations, gauge));
   const ParameterBlocks& blocks = equations.blocks();
   const auto n = static_cast<std::size_t>(blocks.columns());
@@ -214,7 +215,12 @@ Result<std::unique_ptr<InverseNormal>> InverseNormal::make(const Problem& proble
   for (std::uint64_t t = 0; t < equations.tiles().size(); ++t)
     if (equations.tiles().row(t) != equations.tiles().column(t))
       pattern.push_back({equations.tiles().row(t), equations.tiles().column(t)});
-  const auto analysis = analyse_columns(without(blocks), pattern);
+  const auto analysis = analyse_columns(blocks.as_columns(), pattern);
+  const std::uint64_t needed = peak_resident_bytes() + SparseCholesky::bytes(analysis->symbolic) +
+                               SparseCholesky::invert_bytes(analysis->symbolic);
+  if (memory_limit_bytes > 0 && needed > memory_limit_bytes)
+    return Error(ErrorCode::memory_limit, "the covariance would need " + megabytes(needed) +
+                                              ", the limit is " + megabytes(memory_limit_bytes));
   SparseCholesky cholesky({analysis, &analysis->symbolic}, available_kernels().front()->name);
   if (!out->factor(cholesky, 0, threads)) {
     out->ridged_ = true;

@@ -25,11 +25,11 @@ struct LinearPart {
 class InverseNormal {
  public:
   /// Factors and inverts; the tiles of `equations` hold entries of the inverse from then on.
-  /// Throws std::bad_alloc. Errors: usage where the matrix is not positive definite at all.
-  static Result<std::unique_ptr<InverseNormal>> make(const Problem& problem,
-                                                     NormalEquations& equations,
-                                                     const SceneGauge& gauge,
-                                                     const GaugeWeights& weights, Threads& threads);
+  /// Throws std::bad_alloc. Errors: usage where the matrix is not positive definite at all,
+  /// memory_limit (0: none).
+  static Result<std::unique_ptr<InverseNormal>> make(
+      const Problem& problem, NormalEquations& equations, const SceneGauge& gauge,
+      const GaugeWeights& weights, std::uint64_t memory_limit_bytes, Threads& threads);
 
   /// rows x rows, of a function of some blocks that rows couple pair by pair.
   std::vector<double> of(const std::vector<LinearPart>& parts, std::size_t rows) const;

@@ -93,7 +93,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "solve" || verb == "align") options.insert("--residuals");
   if (verb == "covariance")
     options.insert({"--gauge", "--sigma", "--loss", "--conditional", "--observations", "--points",
-                    "--csv", "--fix", "--refine", "--rigs", "--constraints"});
+                    "--memory-limit", "--csv", "--fix", "--refine", "--rigs", "--constraints"});
   if (verb == "solve") options.insert("--sigmas");
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
