@@ -195,7 +195,8 @@ int run(const Arguments& arguments) {
     throw Error(ErrorCode::usage, "--least-squares is for --reference");
   check_outputs({{"--output", arguments.out, true},
                  {"--json", arguments.common.json},
-                 {"--residuals", arguments.constraints.residuals}});
+                 {"--residuals", arguments.constraints.residuals}},
+                with_survey({arguments.in, arguments.reference}, arguments.constraints));
   return by_survey ? run_to_survey(arguments, interrupt, total)
                    : run_to_reference(arguments, interrupt, total);
 }

@@ -89,7 +89,7 @@ std::optional<Finding> weak_lenses(const Problem& problem, int threads) {
 int run(const Arguments& arguments) {
   const Timer total;
   const std::string& json = arguments.common.json;
-  check_outputs({{"--json", json}});
+  check_outputs({{"--json", json}}, with_survey({arguments.in}, arguments.constraints));
   const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   std::vector<Finding> findings = check(input.problem);
   if (auto weak = weak_lenses(input.problem, arguments.common.threads))

@@ -44,6 +44,9 @@ CLI::Option* add_by_kind(CLI::App& app, const std::string& names, const BoundOpt
         ->allow_extra_args(false);
   }
   const auto put = [option](const std::string& text) {
+    if (text.empty() && option.spec.kind == OptionKind::text)
+      throw Error(ErrorCode::usage, "--" + option.spec.name + ": found an empty text, expected " +
+                                        option.spec.placeholder);
     option.put(parse(option.spec, text).value());
   };
   return app.add_option_function<std::string>(names, put, help);

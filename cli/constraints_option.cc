@@ -120,6 +120,12 @@ std::vector<BoundOption> options_of(ConstraintsArguments& arguments, bool adjust
   return bound<ConstraintsArguments>(fields, arguments);
 }
 
+std::vector<std::string> with_survey(std::vector<std::string> inputs,
+                                     const ConstraintsArguments& arguments) {
+  inputs.insert(inputs.end(), arguments.paths.begin(), arguments.paths.end());
+  return inputs;
+}
+
 Constraints read_constraints(const ConstraintsArguments& arguments) {
   return read_constraints(
              std::vector<std::filesystem::path>(arguments.paths.begin(), arguments.paths.end()))

@@ -20,6 +20,10 @@ struct ConstraintsArguments {
 /// With --residuals for a verb that adjusts.
 std::vector<BoundOption> options_of(ConstraintsArguments& arguments, bool adjusts);
 
+/// The files that a verb reads, with those of the survey.
+std::vector<std::string> with_survey(std::vector<std::string> inputs,
+                                     const ConstraintsArguments& arguments);
+
 /// What the option names, as one survey. Throws Error.
 Constraints read_constraints(const ConstraintsArguments& arguments);
 

@@ -63,7 +63,8 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
+  check_outputs({{"OUT", arguments.out, true}, {"--json", json}},
+                {arguments.in, arguments.rigs.path});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);
   const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);

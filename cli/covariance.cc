@@ -73,7 +73,8 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"--json", json}, {"--csv", arguments.csv}});
+  check_outputs({{"--json", json}, {"--csv", arguments.csv}},
+                with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   Problem& problem = input.problem;
   lay_rigs(arguments.rigs, input, arguments.common.quiet);

@@ -47,7 +47,8 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"--csv", arguments.csv}, {"--json", json}});
+  check_outputs({{"--csv", arguments.csv}, {"--json", json}},
+                {arguments.estimate, arguments.reference});
   const ReadOptions hash{.hash = !json.empty()};
   const InputFile estimate = read_file(arguments.estimate, hash).value();
   const InputFile reference = read_file(arguments.reference, hash).value();

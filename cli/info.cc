@@ -171,7 +171,8 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
 int run(const Arguments& arguments) {
   const Timer total;
   const std::string& json = arguments.common.json;
-  check_outputs({{"--pattern", arguments.pattern}, {"--json", json}});
+  check_outputs({{"--pattern", arguments.pattern}, {"--json", json}},
+                {arguments.in, arguments.rigs.path});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json read = input_json(arguments.in, input);
   const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);

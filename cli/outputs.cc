@@ -12,21 +12,57 @@
 
 namespace sheaf {
 
-void check_outputs(const std::vector<NamedOutput>& outputs) {
-  const auto normal = [](const std::string& path) {
-    std::error_code ignored;
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ignored), ignored);
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Links are followed; a file need not be there yet.
+bool is_same(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;
+  if (fs::equivalent(a, b, ignored) && !ignored) return true;
+  const auto normal = [&](const fs::path& path) {
+    fs::path out = fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+    return out.has_filename() ? out : out.parent_path();
   };
+  return normal(a) == normal(b);
+}
+
+/// Whether writing `output` would change `input`.
+bool touches(const std::string& output, const std::string& input) {
+  std::error_code ignored;
+  if (fs::is_fifo(input, ignored) || fs::is_character_file(input, ignored)) return false;
+  if (is_same(output, input)) return true;
+  if (!fs::is_directory(input, ignored)) return false;
+  for (const auto& entry : fs::directory_iterator(input, ignored))
+    if (entry.is_regular_file(ignored) && is_same(output, entry.path())) return true;
+  return false;
+}
+
+}  // namespace
+
+void check_outputs(const std::vector<NamedOutput>& outputs,
+                   const std::vector<std::string>& inputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    if (outputs[i].path.empty()) continue;
-    for (std::size_t j = 0; j < i; ++j) {
-      if (!outputs[j].path.empty() && normal(outputs[i].path) == normal(outputs[j].path))
-        throw Error(ErrorCode::usage,
-                    fmt::format("{} and {} name the same file, {}", outputs[j].option,
-                                outputs[i].option, outputs[i].path));
-    }
-    check_writable(outputs[i].path, outputs[i].model).value();
+    const NamedOutput& output = outputs[i];
+    std::error_code ignored;
+    if (output.path.empty() || fs::is_character_file(output.path, ignored)) continue;
+    for (std::size_t j = 0; j < i; ++j)
+      if (!outputs[j].path.empty() && is_same(output.path, outputs[j].path))
+        throw Error(ErrorCode::usage, fmt::format("{} and {} name the same file, {}",
+                                                  outputs[j].option, output.option, output.path));
+    for (const std::string& input : inputs)
+      if (!input.empty() && touches(output.path, input))
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{} names {}, which the input {} would be lost by: name another one",
+                        output.option, output.path, input));
+    check_writable(output.path, output.model).value();
   }
+}
+
+void check_holds(const Problem& problem, const std::string& path) {
+  if (path.empty()) return;
+  can_hold(write_format(problem, path), problem).value();
 }
 
 std::uint64_t bytes_at(const std::string& path) {

@@ -16,9 +16,16 @@ struct NamedOutput {
   bool model = false;  ///< a problem, which may be a folder
 };
 
-/// Before anything is computed: throws Error (ErrorCode::usage) when two options name one file and
-/// Error (ErrorCode::unwritable_output) when a file cannot be written.
-void check_outputs(const std::vector<NamedOutput>& outputs);
+/// Before anything is computed: throws Error (ErrorCode::usage) when two options name one file, or
+/// one names an input or a file of an input's folder, by any name, and Error
+/// (ErrorCode::unwritable_output) when a file cannot be written. inputs: files and folders; empty
+/// ones were not given.
+void check_outputs(const std::vector<NamedOutput>& outputs,
+                   const std::vector<std::string>& inputs = {});
+
+/// Before anything is computed: throws Error (ErrorCode::usage) where `write` would refuse the
+/// problem's lenses under this name. Nothing without a name.
+void check_holds(const Problem& problem, const std::string& path);
 
 /// Of a file, or of the files of a folder.
 std::uint64_t bytes_at(const std::string& path);

@@ -77,7 +77,7 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"OUT", arguments.out, true}, {"--json", json}});
+  check_outputs({{"OUT", arguments.out, true}, {"--json", json}}, {arguments.in});
   const NoiseOptions& noise = arguments.noise;
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json before = input_json(arguments.in, input);

@@ -73,6 +73,13 @@ struct SigmasWork {
       options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
     found = covariance(problem, options).value();
   }
+
+  // Points of the survey are gone with it by then.
+  std::string write(const Problem& problem, const std::string& path) {
+    found->points.resize(problem.num_points());
+    write_json(covariance_json(problem, options, *found), path);
+    return path;
+  }
 };
 
 // Points of the survey leave the problem, and the summary what it says of their marks.
@@ -153,6 +160,9 @@ void say(const Arguments& arguments, const InputFile& input, const SolveRecord& 
   fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   if (work.survey) fmt::print("{}", survey_text(*work.survey));
+  if (arguments.common.threads > summary.threads)
+    fmt::print("note        {} threads are more than the most, {}\n", arguments.common.threads,
+               summary.threads);
   fmt::print("{}", summary_text(summary, input.read_s));
   fmt::print("{}", residuals_text(work.report));
   if (sigmas.found) fmt::print("{}", covariance_text(input.problem, *sigmas.found));
@@ -171,9 +181,11 @@ int run(Arguments& arguments) {
                  {"--json", arguments.common.json},
                  {"--ply", arguments.ply},
                  {"--residuals", arguments.constraints.residuals},
-                 {"--sigmas", arguments.sigmas}});
+                 {"--sigmas", arguments.sigmas}},
+                with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
+  check_holds(problem, arguments.out);
 
   SolveRecord record;
   record.options = options_json(options_of(arguments.solve));
@@ -202,13 +214,7 @@ int run(Arguments& arguments) {
   if (work.survey) record.after = evaluate(problem);
   std::vector<std::string> written;
   if (summary.usable()) written = write_results(arguments, work, std::move(before), problem);
-  if (sigmas.found) {
-    // Points of the survey are gone with it.
-    sigmas.found->points.resize(problem.num_points());
-    sigmas.found->observations.clear();
-    write_json(covariance_json(problem, sigmas.options, *sigmas.found), arguments.sigmas);
-    written.push_back(arguments.sigmas);
-  }
+  if (sigmas.found) written.push_back(sigmas.write(problem, arguments.sigmas));
   record.write_s = writing.seconds();
   say(arguments, input, record, work, sigmas, summary, held);
   if (wants_json) {

@@ -143,7 +143,8 @@ int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"--plot", arguments.plot}, {"--json", json}});
+  check_outputs({{"--plot", arguments.plot}, {"--json", json}},
+                {arguments.in, arguments.reference});
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   const Json input_document = input_json(arguments.in, input);
   make_bal(input, arguments.own_lenses, arguments.common.quiet);

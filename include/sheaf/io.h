@@ -61,6 +61,10 @@ Result<void> write(const Problem& problem, const std::filesystem::path& path,
 /// Sentences about what of a problem this format does not hold; none where nothing is lost.
 std::vector<std::string> lost_in(const std::string& format, const Problem& problem);
 
+/// Whether `write` can put the problem's lenses and names into this format, found without writing.
+/// Errors: usage, saying what it cannot hold.
+Result<void> can_hold(const std::string& format, const Problem& problem);
+
 /// Whether `write` to this path can begin: the folder exists and a file can be created beside the
 /// target, or, for a model, in it where it is a folder. Leaves nothing behind.
 Result<void> check_writable(const std::filesystem::path& path, bool model = false);

@@ -40,9 +40,13 @@ struct Joined {
 /// runs which task, nor on the order: every task owns what it writes.
 class Threads {
  public:
-  /// count 0: as many as the machine offers to this process.
+  /// More gain nothing anywhere, and systems refuse to start many thousands.
+  static constexpr int kMost = 512;
+
+  /// count 0: as many as the machine offers to this process; more than kMost: kMost.
   explicit Threads(int count)
-      : count_(count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency()),
+      : count_(
+            std::min(kMost, count > 0 ? count : oneapi::tbb::this_task_arena::max_concurrency())),
         arena_(count_) {
     // More threads than cores run only where this allows them (and the request would be warned
     // of). Of several such controls the least holds, so only those that need one make one.

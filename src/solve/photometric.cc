@@ -51,6 +51,7 @@ class Refinement {
     const std::vector<Sight> seen = sights_in(finest);
     summary_.patches_total = all_sights(problem_, rays_).size();
     summary_.patches_visible = seen.size();
+    if (seen.empty() && measurements_.empty()) return unseen();
     PatchStatistics statistics(finest, seen);
     statistics.measure_before(state_);
     summary_.measurements = measurements_.size();
@@ -67,6 +68,18 @@ class Refinement {
   }
 
  private:
+  /// Nothing says where anything is.
+  PhotometricSummary unseen() {
+    Summary& solve = summary_.solve;
+    solve.termination = Termination::no_usable_step;
+    solve.words = "none of the " + std::to_string(summary_.patches_total) +
+                  " patches is seen in any image: the state is as it was; are poses and depths of "
+                  "these images, in this unit?";
+    solve.iterations.push_back({});
+    solve.rounds.push_back({});
+    return summary_;
+  }
+
   PhotometricRules rules() const {
     PhotometricRules out;
     out.poses_held = options_.fix_poses;

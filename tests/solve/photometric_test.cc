@@ -364,5 +364,17 @@ TEST_F(PhotometricCourse, BrightnessExplainsMuchOfTheRest) {
   }
 }
 
+TEST(Photometric, NothingInSightIsSaid) {
+  PhotometricProblem problem = generate(PhotometricSceneOptions{}).value().start;
+  for (std::size_t i = 0; i < problem.poses.size(); ++i)
+    problem.poses[i].translation[0] += 1e5 * static_cast<double>(i);
+  const PhotometricProblem before = problem;
+  const PhotometricSummary summary = refine_photometric(problem).value();
+  EXPECT_EQ(summary.solve.termination, Termination::no_usable_step);
+  EXPECT_NE(summary.solve.words.find("is seen in any image"), std::string::npos)
+      << summary.solve.words;
+  EXPECT_EQ(problem.points, before.points);
+}
+
 }  // namespace
 }  // namespace sheaf

@@ -1,0 +1,52 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "io/bundler.h"
+#include "io/colmap.h"
+#include "io/libmv.h"
+#include "io/nvm.h"
+#include "scene/camera_frame.h"
+#include "sheaf/io.h"
+
+namespace sheaf {
+namespace {
+
+/// What formats refuse stands in lenses and names: the problem without its points is written in no
+/// time.
+Problem without_points(const Problem& problem) {
+  Problem out;
+  out.poses = problem.poses;
+  out.image_camera = problem.image_camera;
+  out.cameras = problem.cameras;
+  if (problem.metadata == nullptr) return out;
+  SceneMetadata metadata;
+  metadata.camera_ids = problem.metadata->camera_ids;
+  metadata.image_ids = problem.metadata->image_ids;
+  metadata.image_names = problem.metadata->image_names;
+  out.metadata = std::make_shared<const SceneMetadata>(std::move(metadata));
+  return out;
+}
+
+template <class Written>
+Result<void> as(const std::string& format, const Result<Written>& written) {
+  if (written.ok()) return {};
+  return Error(ErrorCode::usage, format + " cannot hold this problem: " + written.error().what());
+}
+
+}  // namespace
+
+Result<void> can_hold(const std::string& format, const Problem& problem) {
+  const Problem given = without_points(problem);
+  if (format == "bundler") return as(format, format_bundler(given));
+  if (format == "nvm") return as(format, format_nvm(given));
+  if (format == "libmv") return as(format, format_libmv(given));
+  if (format == "colmap-text") return as(format, format_colmap(given, true));
+  if (format != "bal") return {};
+  Problem turned;
+  return as(format, with_bal_cameras(given, turned));
+}
+
+}  // namespace sheaf
