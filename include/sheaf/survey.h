@@ -177,9 +177,10 @@ struct Survey {
 
 /// Moves a problem into the local frame of the constraints (a robust Sim(3); a rigid motion where
 /// `fixed` holds sensors; none where it holds poses or points, or where fewer than three positions
-/// and control points are used), triangulates control points that the model lacks, and adds terms
-/// and marks. The problem has no metadata until `finish_survey`. Errors: usage or unreadable_input,
-/// and the problem is then as it was.
+/// and control points are used, but that the origin is taken off a model that is in place by the
+/// survey's own projected coordinates), triangulates control points that the model lacks, and adds
+/// terms and marks. The problem has no metadata until `finish_survey`. Errors: usage or
+/// unreadable_input, and the problem is then as it was.
 Result<Survey> place_survey(Problem& problem, const Constraints& constraints,
                             const Fixed& fixed = {});
 

@@ -51,15 +51,19 @@ class WatchedIterator {
 /// Builds the value from the parser's events.
 class Builder : public nlohmann::json_sax<nlohmann::json> {
  public:
-  explicit Builder(const std::string& text) : text_(text), seen_(text.data()) {}
+  explicit Builder(const std::string& text)
+      : text_(text), seen_(text.data()), counted_(text.data()) {}
   const char** seen() { return &seen_; }
   JsonValue root;
   std::string refusal;
 
-  /// A number is known to have ended by the character behind it, which may be a line's end.
-  std::uint64_t line() const {
+  /// A number is known to have ended by the character behind it, which may be a line's end. Lines
+  /// are counted from where they were counted to before.
+  std::uint64_t line() {
     const char* const end = seen_ > text_.data() ? seen_ - 1 : seen_;
-    return 1 + static_cast<std::uint64_t>(std::count(text_.data(), end, '\n'));
+    line_ += static_cast<std::uint64_t>(std::count(counted_, end, '\n'));
+    counted_ = end;
+    return line_;
   }
 
   bool null() override { return add(Kind::null); }
@@ -133,6 +137,8 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
 
   const std::string& text_;
   const char* seen_;
+  const char* counted_;  ///< lines before it are those of line_
+  std::uint64_t line_ = 1;
   JsonValue* last_ = nullptr;
   std::vector<JsonValue*> open_;
   std::string key_;

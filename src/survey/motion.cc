@@ -72,7 +72,10 @@ Similarity robust_start(const std::vector<SurveyTie>& ties, const std::vector<Ve
                         bool rigid) {
   constexpr int kScales = 4;  // lever arms are known in the survey's unit, which the scale tells
   Similarity S = align_robustly(places_of(ties, 1), to).alignment.similarity;
-  if (rigid) return S;
+  const bool arms = std::any_of(ties.begin(), ties.end(), [](const SurveyTie& tie) {
+    return tie.lever_arm != Vector3<double>{0, 0, 0};
+  });
+  if (rigid || !arms) return S;
   for (int round = 0; round < kScales; ++round)
     S = align_robustly(places_of(ties, S.scale), to).alignment.similarity;
   return S;

@@ -21,10 +21,12 @@ namespace {
 constexpr std::size_t kLeastTies = 3;
 // A model that may not move is in the survey's frame where its ties stray by less, in the median.
 constexpr double kInPlaceSigmas = 10;
+// Doubles of this size are 1.5e-11 apart.
+constexpr double kFarFromZero = 1e5;
 
-std::string figures(double x) {
+std::string figures(double x, int digits = 6) {
   char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.6g", x);
+  std::snprintf(buffer, sizeof buffer, "%.*g", digits, x);
   return buffer;
 }
 std::string counted(std::size_t n, const std::string& what) {
@@ -61,7 +63,7 @@ class Placing {
     if (auto e = find_motion()) return *e;
     Result<Terms> terms = survey_terms(problem_, out_, names_);
     if (!terms.ok()) return terms.error();
-    if (motion_) move(problem_, motion_->similarity);
+    if (motion_) move(problem_, *motion_);
     add_points();
     add_survey_points(terms.value());
     problem_.terms = std::move(terms).value();
@@ -229,6 +231,27 @@ class Placing {
     return counted(positions_, "position") + " and " + counted(control_, "control point");
   }
 
+  /// Whether the model is in the survey's frame as it is: its numbers are those of the local frame,
+  /// or those of the survey's own coordinates, of which the origin is then taken off.
+  bool stays_in_place(const std::string& why) {
+    if (manner_.must_move) return false;
+    if (median_sigmas(ties_, {}) <= kInPlaceSigmas) {
+      out_.words.push_back(why + ": the model stays");
+      return true;
+    }
+    if (out_.frame.kind != WorldKind::projected) return false;
+    const std::array<double, 3>& o = *out_.frame.origin;
+    const Similarity shift{1, {1, 0, 0, 0}, {-o[0], -o[1], -o[2]}};
+    if (!(median_sigmas(ties_, shift) <= kInPlaceSigmas)) return false;
+    motion_ = shift;
+    out_.moved = out_.rigid = true;
+    out_.words.push_back(why +
+                         ": the model, which counts in the survey's coordinates, stays there; it "
+                         "is written less their origin " +
+                         figures(o[0], 15) + " " + figures(o[1], 15) + " " + figures(o[2], 15));
+    return true;
+  }
+
   std::optional<Error> find_motion() {
     if (manner_.must_move && ties_.size() < kLeastTies)
       return Error(ErrorCode::unreadable_input,
@@ -237,10 +260,9 @@ class Placing {
                        "model is turned and scaled" +
                        (out_.unused.empty() ? "" : "; " + out_.unused.front()));
     if (ties_.empty()) return {};
-    const bool in_place = !manner_.must_move && median_sigmas(ties_, {}) <= kInPlaceSigmas;
+    tell_far_numbers();
     if (held()) {
-      if (in_place)
-        return out_.words.push_back("poses or points are held: the model stays"), std::nullopt;
+      if (stays_in_place("poses or points are held")) return {};
       return Error(ErrorCode::usage,
                    paths_of(constraints_) + ": the model is not in the frame of its coordinates (" +
                        ties_text() + " are off by " + figures(median_sigmas(ties_, {})) +
@@ -248,14 +270,14 @@ class Placing {
                        "are held: solve without --fix of these first");
     }
     if (ties_.size() < kLeastTies) {
+      if (stays_in_place(ties_text() + " are too few to move by")) return {};
       out_.words.push_back(ties_text() +
                            " of the three that are needed: how the model is turned "
                            "and scaled is not determined by them, and it was not moved");
       return {};
     }
     if (in_a_line(ties_)) {
-      if (in_place)
-        return out_.words.push_back("what is used lies in a line: the model stays"), std::nullopt;
+      if (stays_in_place("what is used lies in a line")) return {};
       return Error(ErrorCode::unreadable_input,
                    paths_of(constraints_) + ": " + ties_text() +
                        " that are used lie in a line: how the "
@@ -263,22 +285,33 @@ class Placing {
     }
     out_.rigid =
         manner_.rigid || (!problem_.rigs.empty() && (fixed_.sensors || !fixed_.sensor_ids.empty()));
-    motion_ = motion_of(ties_, out_.rigid);
-    if (!(motion_->similarity.scale > 0) || !std::isfinite(motion_->similarity.scale))
+    const SurveyMotion motion = motion_of(ties_, out_.rigid);
+    if (!(motion.similarity.scale > 0) || !std::isfinite(motion.similarity.scale))
       return Error(ErrorCode::unreadable_input,
                    paths_of(constraints_) + ": no motion takes the model to its coordinates");
-    tell_motion();
+    tell(motion);
     return {};
   }
 
-  void tell_motion() {
+  void tell_far_numbers() {
+    double most = 0;
+    for (const SurveyTie& tie : ties_)
+      for (const double x : tie.to) most = std::max(most, std::abs(x));
+    if (out_.frame.kind == WorldKind::local && most > kFarFromZero)
+      out_.words.push_back("coordinates are up to " + figures(most) +
+                           " from 0 and their frame is \"local\", which takes nothing off: as "
+                           "\"projected\" they lose no digits");
+  }
+
+  void tell(const SurveyMotion& motion) {
+    motion_ = motion.similarity;
     out_.moved = true;
-    out_.scale = motion_->similarity.scale;
-    out_.rotation = motion_->similarity.rotation;
-    out_.translation = motion_->similarity.translation;
+    out_.scale = motion.similarity.scale;
+    out_.rotation = motion.similarity.rotation;
+    out_.translation = motion.similarity.translation;
     out_.ties = ties_.size();
-    out_.outliers = motion_->outliers;
-    out_.threshold_sigmas = motion_->threshold_sigmas;
+    out_.outliers = motion.outliers;
+    out_.threshold_sigmas = motion.threshold_sigmas;
     const std::string why = manner_.rigid ? "" : "sensors are held: ";
     out_.words.push_back(out_.rigid ? why + "the model was turned and shifted to " + ties_text()
                                     : "the model was turned, shifted and scaled by " +
@@ -287,7 +320,7 @@ class Placing {
 
   void add_points() {
     for (std::size_t i = 0; i < places_.size(); ++i)
-      if (places_[i] && motion_) places_[i] = motion_->similarity(*places_[i]);
+      if (places_[i] && motion_) places_[i] = (*motion_)(*places_[i]);
     out_.own_points = problem_.num_points();
     out_.own_observations = problem_.num_observations();
     out_.own_sigmas = !problem_.observation_sigma.empty();
@@ -359,7 +392,7 @@ class Placing {
   std::vector<std::optional<Vector3<double>>> places_;  ///< of points, in the model
   std::vector<SurveyTie> ties_;
   std::size_t positions_ = 0, control_ = 0;
-  std::optional<SurveyMotion> motion_;
+  std::optional<Similarity> motion_;
 };
 
 }  // namespace

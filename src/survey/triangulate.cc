@@ -6,6 +6,7 @@
 
 #include "geometry/camera_model.h"
 #include "platform/parallel.h"
+#include "scene/similarity.h"
 #include "starts/intersection.h"
 
 namespace sheaf {
@@ -17,12 +18,26 @@ Vector3<double> in_camera_of(const Problem& problem, std::uint32_t image,
   return in_camera(matrix_from_quaternion(pose.rotation), pose, X.data());
 }
 
+/// A place among the cameras in whole units, which are taken off and put back exactly: where rays
+/// meet is sought with a little weight on 0, which is to be near.
+Vector3<double> middle_of(const std::vector<Pose>& poses) {
+  Vector3<double> out{};
+  for (const Pose& pose : poses) {
+    const Vector3<double> C = camera_centre(matrix_from_quaternion(pose.rotation), pose);
+    for (std::size_t k = 0; k < 3; ++k) out[k] += C[k] / static_cast<double>(poses.size());
+  }
+  for (double& x : out) x = std::round(x);
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::optional<Vector3<double>>> triangulate(
     const Problem& problem, const std::vector<std::vector<Sighting>>& points) {
   Problem marked;
-  marked.poses = problem.poses;
+  const Vector3<double> middle = middle_of(problem.poses);
+  const Similarity there{1, {1, 0, 0, 0}, {-middle[0], -middle[1], -middle[2]}};
+  for (const Pose& pose : problem.poses) marked.poses.push_back(moved(pose, there));
   marked.cameras = problem.cameras;
   marked.image_camera = problem.image_camera;
   for (const std::vector<Sighting>& sightings : points) {
@@ -39,7 +54,8 @@ std::vector<std::optional<Vector3<double>>> triangulate(
   std::vector<std::optional<Vector3<double>>> out(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].size() < 2) continue;
-    const Vector3<double> X{state.points[3 * i], state.points[3 * i + 1], state.points[3 * i + 2]};
+    const Vector3<double> X{state.points[3 * i] + middle[0], state.points[3 * i + 1] + middle[1],
+                            state.points[3 * i + 2] + middle[2]};
     bool seen = std::isfinite(X[0] + X[1] + X[2]);
     for (const Sighting& s : points[i])
       seen = seen && sees(problem.cameras[problem.image_camera[s.image]],

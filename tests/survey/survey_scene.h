@@ -29,6 +29,7 @@ struct SurveyScene {
     options.scene.seed = seed;
     scene = generate(options).value();
   }
+  explicit SurveyScene(const LensSceneOptions& options) : scene(generate(options).value()) {}
 
   std::array<double, 3> world(const Vector3<double>& X) const {
     return {far[0] + kScale * X[0], far[1] - kScale * X[1], far[2] - kScale * X[2]};
