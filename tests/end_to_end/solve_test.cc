@@ -146,13 +146,13 @@ TEST_F(SolveVerb, CompressedFilesAreReadAndWritten) {
   }
 }
 
-TEST_F(SolveVerb, InPlaceAndPly) {
+TEST_F(SolveVerb, OutputAndPly) {
   generate({"--points", "300"});
   const double before = evaluate(problem("in.txt")).cost;
-  ASSERT_EQ(run({"solve", "in.txt", "-o", "in.txt", "--ply", "o.ply"}).exit_code, 0);
-  EXPECT_LT(evaluate(problem("in.txt")).cost, before);
+  ASSERT_EQ(run({"solve", "in.txt", "-o", "out.txt", "--ply", "o.ply"}).exit_code, 0);
+  EXPECT_LT(evaluate(problem("out.txt")).cost, before);
   EXPECT_EQ(contents_of(folder_ / "o.ply").substr(0, 4), "ply\n");
-  EXPECT_EQ(folder_.names(), (Words{"in.txt", "o.ply"}));
+  EXPECT_EQ(folder_.names(), (Words{"in.txt", "o.ply", "out.txt"}));
 }
 
 TEST_F(SolveVerb, NoiseIsAllThatIsLeft) {
