@@ -243,8 +243,8 @@ class Placing {
     const std::array<double, 3>& o = *out_.frame.origin;
     const Similarity shift{1, {1, 0, 0, 0}, {-o[0], -o[1], -o[2]}};
     if (!(median_sigmas(ties_, shift) <= kInPlaceSigmas)) return false;
-    motion_ = shift;
-    out_.moved = out_.rigid = true;
+    set_motion(shift);
+    out_.rigid = true;
     out_.words.push_back(why +
                          ": the model, which counts in the survey's coordinates, stays there; it "
                          "is written less their origin " +
@@ -303,13 +303,17 @@ class Placing {
                            "\"projected\" they lose no digits");
   }
 
-  void tell(const SurveyMotion& motion) {
-    motion_ = motion.similarity;
+  void set_motion(const Similarity& motion) {
+    motion_ = motion;
     out_.moved = true;
-    out_.scale = motion.similarity.scale;
-    out_.rotation = motion.similarity.rotation;
-    out_.translation = motion.similarity.translation;
+    out_.scale = motion.scale;
+    out_.rotation = motion.rotation;
+    out_.translation = motion.translation;
     out_.ties = ties_.size();
+  }
+
+  void tell(const SurveyMotion& motion) {
+    set_motion(motion.similarity);
     out_.outliers = motion.outliers;
     out_.threshold_sigmas = motion.threshold_sigmas;
     const std::string why = manner_.rigid ? "" : "sensors are held: ";

@@ -243,6 +243,8 @@ TEST(SurveyRigs, HeldFramesInTheSurveysCoordinatesStayThere) {
   fixed.poses = true;
   const Survey survey = place_survey(problem, drive.constraints(), fixed).value();
   EXPECT_TRUE(survey.moved && survey.rigid);
+  EXPECT_EQ(survey.translation, (std::array<double, 3>{-kFar[0], -kFar[1], -kFar[2]}));
+  EXPECT_EQ(survey.ties, 48u);
   EXPECT_LT(largest_off(drive, problem), 1e-8);
   for (std::size_t i = 0; i < problem.points.size(); ++i)
     EXPECT_NEAR(problem.points[i], drive.truth.points[i], 1e-9);
