@@ -11,16 +11,33 @@ namespace sheaf {
 LossMoments normal_moments(const ScaledLoss& loss, double sigma) {
   if (loss.kind == LossKind::none) return {};
   constexpr int kShares = 4096;
-  LossMoments out{0, 0, 0};
+  LossMoments out{0, 0, 0, 0, 0};
   for (int i = 0; i < kShares; ++i) {
     const double s = -2 * sigma * sigma * std::log((i + 0.5) / kShares);
     const LossValue<double> rho = evaluate_loss(loss, s);
     out.weight += rho.first / kShares;
     out.slope += (rho.first + s * rho.second) / kShares;
     out.square += rho.first * rho.first * s / (2 * sigma * sigma) / kShares;
+    out.weight_square += rho.first * rho.first / kShares;
+    out.slope_square += slope_square(rho, s) / kShares;
   }
   return out;
 }
+
+namespace {
+
+/// E[w] / E[slope]^2, corrected for unknowns that are no small part of the rows: Huber's K^2 with K
+/// = 1 + unknowns / rows * var(slope) / E[slope]^2 (Robust Statistics, 1981, section 7.6), less
+/// what J^T W J itself already has of it, weights varying as they do.
+double spread_of(const LossMoments& m, double share) {
+  const auto grown = [&](double square, double mean) {
+    return 1 + share * std::max(0.0, square / (mean * mean) - 1);
+  };
+  const double K = grown(m.slope_square, m.slope);
+  return m.weight / (m.slope * m.slope) * K * K / grown(m.weight_square, m.weight);
+}
+
+}  // namespace
 
 /// Without a loss: the sum of squares by the redundancy. With one: Huber's covariance of an
 /// M-estimator, B / A^2 (J^T J)^-1, with J^T W J / E[w] in the place of J^T J, as outliers tell
@@ -40,7 +57,7 @@ Noise noise_of(const ResidualMoments& m, const ScaledLoss& loss, double stated, 
   if (stated > 0 || out.redundancy <= 0 || !(m.slope > 0)) {
     const LossMoments normal = normal_moments(loss, stated > 0 ? stated : 1);
     out.sigma = stated > 0 ? stated : 1;
-    out.factor = normal.square * normal.weight / (normal.slope * normal.slope);
+    out.factor = normal.square * spread_of(normal, out.redundancy > 0 ? unknowns / rows : 0);
     return out;
   }
   const double n = static_cast<double>(m.observations);
@@ -60,7 +77,9 @@ Noise noise_of(const ResidualMoments& m, const ScaledLoss& loss, double stated, 
   out.sigma = sigma;
   out.redundancy = effective - unknowns;
   const double share = std::min(1.0, weight / normal.weight);
-  out.factor = normal.square * (weight / share) / (slope / share * (slope / share));
+  const LossMoments seen{weight / share, slope / share, normal.square, m.weight_square / n / share,
+                         m.slope_square / n / share};
+  out.factor = normal.square * spread_of(seen, std::min(1.0, unknowns / effective));
   return out;
 }
 

@@ -8,9 +8,11 @@
 namespace sheaf {
 
 /// E over normal residuals of two components and the sigma given: of w, of the score's mean
-/// derivative w + s rho'', and of w^2 s / 2 by sigma^2.
+/// derivative w + s rho'', and of w^2 s / 2 by sigma^2; of the squares of the first two.
 struct LossMoments {
   double weight = 1, slope = 1, square = 1;
+  double weight_square = 1;
+  double slope_square = 1;  ///< half the trace of the square of the score's derivative
 };
 LossMoments normal_moments(const ScaledLoss& loss, double sigma);
 

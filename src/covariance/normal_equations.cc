@@ -269,6 +269,8 @@ void NormalEquations::add_points() {
       moments_.square += rho.first * rho.first * s;
       moments_.weight += rho.first;
       moments_.slope += rho.first + s * rho.second;
+      moments_.weight_square += rho.first * rho.first;
+      moments_.slope_square += slope_square(rho, s);
       add_observation(row, rho.first);
     }
     if (points_held_) continue;

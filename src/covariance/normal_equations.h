@@ -21,12 +21,20 @@ namespace sheaf {
 /// What the residuals are like, of observations under their loss.
 struct ResidualMoments {
   std::uint64_t observations = 0;
-  double square = 0;        ///< sum w^2 s
-  double weight = 0;        ///< sum w
-  double slope = 0;         ///< sum w + s rho'': the mean derivative of the score, by 2 components
-  double terms_square = 0;  ///< of the terms and of points' own rows: sum w s
-  std::uint64_t terms = 0;  ///< their rows
+  double square = 0;         ///< sum w^2 s
+  double weight = 0;         ///< sum w
+  double slope = 0;          ///< sum w + s rho'': the mean derivative of the score, by 2 components
+  double weight_square = 0;  ///< sum w^2
+  double slope_square = 0;   ///< sum of half the trace of the square of the score's derivative
+  double terms_square = 0;   ///< of the terms and of points' own rows: sum w s
+  std::uint64_t terms = 0;   ///< their rows
 };
+
+/// Half the trace of the square of w I + 2 rho'' r r^T, the derivative of the score by r.
+inline double slope_square(const LossValue<double>& rho, double s) {
+  const double along = rho.second * s;
+  return rho.first * rho.first + 2 * along * (rho.first + along);
+}
 
 /// The undamped normal equations at a state, J^T W J with W the weights of the loss, points
 /// eliminated: by plain formulas, once. Rows of one point: W = sum Jc^T w Jp of each block.
