@@ -57,6 +57,10 @@ class Telling {
   std::vector<double> scaled(const std::vector<LinearPart>& parts, std::size_t rows) const {
     std::vector<double> C = inverse_.of(parts, rows);
     for (double& x : C) x *= variance_;
+    // What the gauge makes exact comes out as 0 to rounding, on either side of it.
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t j = 0; C[(rows + 1) * i] <= 0 && j < rows; ++j)
+        C[rows * i + j] = C[rows * j + i] = 0;
     for (const LinearPart& part : parts)
       for (std::size_t k = 0; k < blocks_.width(part.block); ++k) {
         if (inverse_.determined(blocks_.first[part.block] + static_cast<std::int32_t>(k))) continue;

@@ -105,7 +105,7 @@ void InverseNormal::solve_gauge(const Problem& problem, const GaugeWeights& weig
           for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t l = 0; l < 3; ++l)
               M_[n * k + static_cast<std::size_t>(blocks.first[point.blocks[b]]) + r] -=
-                  point.W[b][3 * r + i] * point.inverse[3 * i + l] * a[3 * k + l];
+                  point.W[b][9 * i + r] * point.inverse[3 * i + l] * a[3 * k + l];
   }
   for (std::size_t k = 0; k < d; ++k) {
     for (const std::int32_t c : pinned_) M_[n * k + static_cast<std::size_t>(c)] = 0;
@@ -148,7 +148,7 @@ std::vector<double> InverseNormal::of_point_gauge(const NormalEquations::Point& 
         for (std::size_t i = 0; i < 3; ++i)
           right[3 * k + i] -=
               M_[n * k + static_cast<std::size_t>(blocks.first[point.blocks[b]]) + r] *
-              point.W[b][3 * r + i];
+              point.W[b][9 * i + r];
   for (std::size_t k = 0; k < d; ++k)
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t l = 0; l < 3; ++l)
@@ -273,24 +273,29 @@ std::vector<double> InverseNormal::of(const std::vector<LinearPart>& parts,
 std::array<double, 9> InverseNormal::of(const NormalEquations::Point& point,
                                         const double* X) const {
   const ParameterBlocks& blocks = equations_.blocks();
-  std::array<double, 9> middle{};  // W^T Z W
-  for (std::size_t a = 0; a < point.blocks.size(); ++a)
-    for (std::size_t b = 0; b <= a; ++b) {
-      const double* Z = equations_.tiles().of(point.blocks[a], point.blocks[b]);
-      const std::size_t rows = blocks.width(point.blocks[a]),
-                        columns = blocks.width(point.blocks[b]);
-      std::array<double, 9> sum{};
-      for (std::size_t r = 0; r < rows; ++r) {
-        std::array<double, 3> ZW{};
-        for (std::size_t c = 0; c < columns; ++c)
-          for (std::size_t k = 0; k < 3; ++k) ZW[k] += Z[9 * r + c] * point.W[b][3 * c + k];
-        for (std::size_t i = 0; i < 3; ++i)
-          for (std::size_t k = 0; k < 3; ++k) sum[3 * i + k] += point.W[a][3 * r + i] * ZW[k];
-      }
+  const BlockTiles& tiles = equations_.tiles();
+  // The lower triangle of blocks, half of the diagonal ones, each of the nine entries of W^T Z W as
+  // nine summands.
+  std::array<double, 81> lanes{};
+  tiles.for_pairs(point.blocks, [&](std::size_t at, std::size_t a, std::size_t b) {
+    const double *Z = tiles.at(at), *left = point.W[a].data(), *right = point.W[b].data();
+    const std::size_t rows = blocks.width(point.blocks[a]);
+    std::array<double, 27> WZ{};
+    for (std::size_t r = 0; r < rows; ++r)
       for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t k = 0; k < 3; ++k)
-          middle[3 * i + k] += a == b ? sum[3 * i + k] : sum[3 * i + k] + sum[3 * k + i];
-    }
+        for (std::size_t c = 0; c < 9; ++c) WZ[9 * i + c] += left[9 * i + r] * Z[9 * r + c];
+    if (a == b)
+      for (double& x : WZ) x *= 0.5;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t c = 0; c < 9; ++c)
+          lanes[9 * (3 * i + k) + c] += WZ[9 * i + c] * right[9 * k + c];
+  });
+  std::array<double, 9> lower{}, middle;
+  for (std::size_t e = 0; e < 9; ++e)
+    for (std::size_t c = 0; c < 9; ++c) lower[e] += lanes[9 * e + c];
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k) middle[3 * i + k] = lower[3 * i + k] + lower[3 * k + i];
   std::array<double, 9> half{}, out = point.inverse;
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t k = 0; k < 3; ++k)
@@ -331,7 +336,7 @@ std::array<double, 4> InverseNormal::of_fit(const NormalEquations::Point& point,
     for (std::size_t r = 0; r < 2; ++r)
       for (std::size_t c = 0; c < blocks.width(point.blocks[b]); ++c)
         for (std::size_t k = 0; k < 3; ++k)
-          E[b][9 * r + c] -= JV[3 * r + k] * point.W[b][3 * c + k];
+          E[b][9 * r + c] -= JV[3 * r + k] * point.W[b][9 * k + c];
   }
   for (std::size_t a = 0; a < E.size(); ++a)
     for (std::size_t b = 0; b <= a; ++b) {

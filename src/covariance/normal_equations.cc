@@ -14,14 +14,48 @@ namespace {
 /// Far below what rounding leaves of a point's V: what is lost is not there.
 constexpr double kSingular = 1e-13;
 
-void sort_unique(std::vector<std::uint64_t>& keys) {
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-}
+/// Pairs of blocks that some row or some point couples: a bit of each pair that there may be, or a
+/// list where these would be too many.
+class CoupledPairs {
+ public:
+  explicit CoupledPairs(std::size_t blocks)
+      : blocks_(blocks), bits_(blocks <= kManyBlocks ? blocks * (blocks + 1) / 2 : 0) {}
 
-std::uint64_t key(std::uint32_t a, std::uint32_t b) {
-  return std::uint64_t(std::max(a, b)) << 32 | std::min(a, b);
-}
+  void add(std::uint32_t row, std::uint32_t column) {  // row >= column
+    if (blocks_ <= kManyBlocks) {
+      bits_[std::size_t(row) * (row + 1) / 2 + column] = true;
+      return;
+    }
+    keys_.push_back(std::uint64_t(row) << 32 | column);
+    if (keys_.size() > kManyKeys && keys_.size() > 2 * sorted_) {
+      sort_unique();
+      sorted_ = keys_.size();
+    }
+  }
+  /// Sorted, each once.
+  std::vector<std::uint64_t> take() {
+    std::size_t at = 0;
+    for (std::uint64_t row = 0; blocks_ <= kManyBlocks && row < blocks_; ++row)
+      for (std::uint64_t column = 0; column <= row; ++column)
+        if (bits_[at++]) keys_.push_back(row << 32 | column);
+    if (blocks_ > kManyBlocks) sort_unique();
+    keys_.shrink_to_fit();
+    return std::move(keys_);
+  }
+
+ private:
+  static constexpr std::size_t kManyBlocks = 20000;  // 25 MB of bits
+  static constexpr std::size_t kManyKeys = std::size_t(1) << 24;
+  void sort_unique() {
+    std::sort(keys_.begin(), keys_.end());
+    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+  }
+
+  const std::size_t blocks_;
+  std::vector<bool> bits_;
+  std::vector<std::uint64_t> keys_;
+  std::size_t sorted_ = 0;
+};
 
 }  // namespace
 
@@ -116,13 +150,11 @@ NormalEquations::TermRowsOf NormalEquations::rows_of(const Term& term,
 }
 
 void NormalEquations::make_pattern() {
-  constexpr std::size_t kMany = std::size_t(1) << 24;
-  std::vector<std::uint64_t> pairs;
-  std::size_t sorted = 0;
-  for (std::uint32_t b = 0; b < blocks_.count(); ++b) pairs.push_back(key(b, b));
+  CoupledPairs pairs(blocks_.count());
+  for (std::uint32_t b = 0; b < blocks_.count(); ++b) pairs.add(b, b);
   for (const TermRowsOf& term : terms_)
     for (const std::uint32_t a : term.blocks)
-      for (const std::uint32_t b : term.blocks) pairs.push_back(key(a, b));
+      for (const std::uint32_t b : term.blocks) pairs.add(std::max(a, b), std::min(a, b));
   std::vector<std::uint32_t> seen;
   for (std::size_t p = 0; p < problem_.num_points(); ++p) {
     seen.clear();
@@ -137,15 +169,9 @@ void NormalEquations::make_pattern() {
     std::sort(seen.begin(), seen.end());
     seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
     for (std::size_t a = 0; a < seen.size(); ++a)
-      for (std::size_t b = 0; b <= a; ++b) pairs.push_back(key(seen[a], seen[b]));
-    if (pairs.size() > kMany && pairs.size() > 2 * sorted) {
-      sort_unique(pairs);
-      sorted = pairs.size();
-    }
+      for (std::size_t b = 0; b <= a; ++b) pairs.add(seen[a], seen[b]);
   }
-  sort_unique(pairs);
-  pairs.shrink_to_fit();
-  tiles_ = std::make_unique<BlockTiles>(blocks_.count(), std::move(pairs));
+  tiles_ = std::make_unique<BlockTiles>(blocks_.count(), pairs.take());
 }
 
 void NormalEquations::add_terms() {
@@ -213,9 +239,9 @@ void NormalEquations::point(std::size_t index, Point& out) const {
         out.W.insert(out.W.begin() + place, std::array<double, 27>{});
       }
       std::array<double, 27>& W = out.W[static_cast<std::size_t>(place)];
-      for (std::size_t i2 = 0; i2 < part.width; ++i2)
-        for (std::size_t b = 0; b < 3; ++b)
-          W[3 * i2 + b] += w * (part.J[i2] * row.point[b] + part.J[9 + i2] * row.point[3 + b]);
+      for (std::size_t b = 0; b < 3; ++b)
+        for (std::size_t i2 = 0; i2 < part.width; ++i2)
+          W[9 * b + i2] += w * (part.J[i2] * row.point[b] + part.J[9 + i2] * row.point[3 + b]);
     }
   }
   if (!prior_.empty() && prior_[index] >= 0) {
@@ -234,26 +260,21 @@ void NormalEquations::point(std::size_t index, Point& out) const {
   invert3(ridged, 0, out.inverse);
 }
 
-/// S -= W V^-1 W^T.
+/// S -= W V^-1 W^T. What is beyond a block's columns is 0 in W.
 void NormalEquations::eliminate(const Point& point) {
-  std::array<double, 27> Y;
-  for (std::size_t a = 0; a < point.blocks.size(); ++a) {
+  std::array<double, 27> Y;  // W V^-1, 9 x 3
+  tiles_->for_pairs(point.blocks, [&](std::size_t at, std::size_t a, std::size_t b) {
     const std::size_t rows = blocks_.width(point.blocks[a]);
-    for (std::size_t i = 0; i < rows; ++i)
+    for (std::size_t i = 0; b == 0 && i < rows; ++i)
       for (std::size_t k = 0; k < 3; ++k)
-        Y[3 * i + k] = point.W[a][3 * i] * point.inverse[k] +
-                       point.W[a][3 * i + 1] * point.inverse[3 + k] +
-                       point.W[a][3 * i + 2] * point.inverse[6 + k];
-    for (std::size_t b = 0; b <= a; ++b) {
-      double* tile = tiles_->of(point.blocks[a], point.blocks[b]);
-      const std::size_t columns = blocks_.width(point.blocks[b]);
-      const std::array<double, 27>& W = point.W[b];
-      for (std::size_t i = 0; i < rows; ++i)
-        for (std::size_t k = 0; k < columns; ++k)
-          tile[9 * i + k] -=
-              Y[3 * i] * W[3 * k] + Y[3 * i + 1] * W[3 * k + 1] + Y[3 * i + 2] * W[3 * k + 2];
-    }
-  }
+        Y[3 * i + k] = point.W[a][i] * point.inverse[k] + point.W[a][9 + i] * point.inverse[3 + k] +
+                       point.W[a][18 + i] * point.inverse[6 + k];
+    double* tile = tiles_->at(at);
+    const double* W = point.W[b].data();
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t k = 0; k < 9; ++k)
+        tile[9 * i + k] -= Y[3 * i] * W[k] + Y[3 * i + 1] * W[9 + k] + Y[3 * i + 2] * W[18 + k];
+  });
 }
 
 void NormalEquations::add_points() {

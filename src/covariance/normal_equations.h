@@ -45,7 +45,7 @@ class NormalEquations {
     std::array<double, 9> V{}, inverse{};
     bool seen = false, determined = false;
     std::vector<std::uint32_t> blocks;      ///< ascending
-    std::vector<std::array<double, 27>> W;  ///< 9 x 3 of each, row-major
+    std::vector<std::array<double, 27>> W;  ///< 3 x 9 of each: W^T, row-major
   };
 
   /// The problem and the options must outlive it. Throws std::bad_alloc.
