@@ -78,9 +78,8 @@ std::optional<Finding> weak_lenses(const Problem& problem, int threads) {
   constexpr std::size_t kMostListed = 1000;
   out.first.resize(std::min(out.first.size(), kMostListed));
   out.words = fmt::format(
-      "{} {} parameters that measurements with a sigma of 1 px would not determine: {}{}; hold "
-      "them "
-      "(--fix), share the lens, or take images that cover it (docs/covariance.md)",
+      "{} {} parameters that measurements with a sigma of 1 px would not determine: {}{}; "
+      "hold them (--fix), share the lens, or take images that cover it (docs/covariance.md)",
       plural(out.count, "lens", "lenses"), out.count == 1 ? "has" : "have", fmt::join(worst, "; "),
       found.value().weak.size() > kShown ? " ..." : "");
   return out;

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "geometry/rotation.h"
+#include "io/csv_field.h"
 #include "starts/sights.h"
 #include "survey/image_names.h"
 
@@ -181,13 +182,7 @@ Json weak_json(const Problem& problem, const Covariance& of) {
 
 void add_line(std::string& to, const char* kind, const std::string& name, const char* parameter,
               double value, double sigma) {
-  std::string field = name;
-  if (field.find_first_of(",\"\n\r") != std::string::npos) {
-    std::string escaped;
-    for (const char c : field) escaped += c == '"' ? std::string("\"\"") : std::string(1, c);
-    field = "\"" + escaped + "\"";
-  }
-  to += fmt::format("{},{},{},{},{}\n", kind, field, parameter, value, sigma);
+  to += fmt::format("{},{},{},{},{}\n", kind, csv_field(name), parameter, value, sigma);
 }
 
 }  // namespace

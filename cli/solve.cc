@@ -61,17 +61,23 @@ struct SurveyWork {
   SurveyReport report{};
 };
 
-// How well the end is known, with the survey's terms still in the problem: --sigmas.
+// How well the end is known, with the survey's terms still in the problem: --sigmas. An error waits
+// until all else is written.
 struct SigmasWork {
   CovarianceOptions options;
   std::optional<Covariance> found;
+  std::optional<Error> failed;
 
   void run(const Problem& problem, const SolveOptions& solved, const Summary& summary) {
     options.fixed = solved.fixed;
     options.threads = solved.threads;
     if (solved.loss.kind != LossKind::none)
       options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
-    found = covariance(problem, options).value();
+    Result<Covariance> told = covariance(problem, options);
+    if (told.ok())
+      found = std::move(told).value();
+    else
+      failed = told.error();
   }
 
   // Points of the survey are gone with it by then.
@@ -227,6 +233,7 @@ int run(Arguments& arguments) {
   if (!written.empty()) fmt::print("wrote       {}\n", fmt::join(written, ", "));
   if (summary.usable() && !arguments.out.empty())
     print_losses(write_format(problem, arguments.out), problem);
+  if (sigmas.failed) throw *sigmas.failed;
   return exit_code_of(summary.termination);
 }
 

@@ -15,7 +15,7 @@ namespace sheaf {
 /// nine rows of nine.
 class BlockTiles {
  public:
-  static constexpr std::size_t kStride = 9, kDoubles = 81;
+  static constexpr std::size_t kDoubles = 81;
 
   /// pairs: row in the upper 32 bits, column <= row in the lower ones; sorted, each once, the
   /// diagonal among them. Throws std::bad_alloc.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <new>
 
@@ -12,28 +11,21 @@
 #include "covariance/noise.h"
 #include "covariance/weak_directions.h"
 #include "platform/clock.h"
-#include "starts/sights.h"
+#include "platform/real_text.h"
 
 namespace sheaf {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-std::string figures(double x) {
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.6g", x);
-  return buffer;
-}
-
 /// Fills a Covariance from the inverse, part by part.
 class Telling {
  public:
   Telling(const Problem& problem, const CovarianceOptions& options, NormalEquations& equations,
-          const SceneGauge& gauge, const InverseNormal& inverse, Threads& threads, Covariance& out)
+          const InverseNormal& inverse, Threads& threads, Covariance& out)
       : problem_(problem),
         options_(options),
         equations_(equations),
-        gauge_(gauge),
         inverse_(inverse),
         threads_(threads),
         blocks_(equations.blocks()),
@@ -189,7 +181,6 @@ class Telling {
   const Problem& problem_;
   const CovarianceOptions& options_;
   NormalEquations& equations_;
-  const SceneGauge& gauge_;
   const InverseNormal& inverse_;
   Threads& threads_;
   const ParameterBlocks& blocks_;
@@ -222,10 +213,10 @@ void add_words(const GaugeWeights& weights, const InverseNormal& inverse, Covari
         "the data leave " + std::to_string(out.deficit) + " of the scene's seven freedoms" +
         (out.deficit < 7 && !names.empty() ? " (" + names + ")" : "") + "; " + weights.words);
   }
-  out.words.push_back("sigma of a residual " + figures(out.sigma) +
-                      (out.sigma_estimated
-                           ? ", from the residuals (redundancy " + figures(out.redundancy) + ")"
-                           : ", as stated"));
+  out.words.push_back("sigma of a residual " + few_digits(out.sigma, 6) +
+                      (out.sigma_estimated ? ", from the residuals (redundancy " +
+                                                 few_digits(out.redundancy, 6) + ")"
+                                           : ", as stated"));
   if (inverse.ridged())
     out.words.push_back("the measurements leave more undetermined than the scene's freedoms");
   if (out.undetermined_points > 0)
@@ -278,7 +269,7 @@ Result<Covariance> covariance(const Problem& given, const CovarianceOptions& opt
     const auto inverse = InverseNormal::make(*problem, equations, gauge, weights.value(),
                                              options.memory_limit_bytes, threads);
     if (!inverse.ok()) return inverse.error();
-    Telling(*problem, options, equations, gauge, *inverse.value(), threads, out).run();
+    Telling(*problem, options, equations, *inverse.value(), threads, out).run();
     out.weak = weak_directions(*problem, out.lenses);
     add_words(weights.value(), *inverse.value(), out);
     out.seconds = clock.seconds();

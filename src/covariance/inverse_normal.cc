@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "eliminate/kernel_table.h"
 #include "platform/memory.h"
@@ -17,10 +16,6 @@ namespace {
 /// that comes near its inverse is the ridge's.
 constexpr double kRidge = 1e-12, kRidged = 1e-3;
 constexpr double kHopeless = 1e14;
-
-std::string megabytes(std::uint64_t bytes) {
-  return std::to_string((bytes + 999999) / 1000000) + " MB";
-}
 
 }  // namespace
 
@@ -174,7 +169,7 @@ void InverseNormal::into_gauge(const double* G, const double* M, std::size_t row
 void InverseNormal::take_inverse(const SparseCholesky& cholesky) {
   const ParameterBlocks& blocks = equations_.blocks();
   BlockTiles& tiles = equations_.tiles();
-  const double* panels = const_cast<SparseCholesky&>(cholesky).panels();
+  const double* panels = cholesky.panels();
   for (std::uint64_t t = 0; t < tiles.size(); ++t) {
     const std::uint32_t a = tiles.row(t), b = tiles.column(t);
     double* to = tiles.at(t);

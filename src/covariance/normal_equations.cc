@@ -219,7 +219,7 @@ std::array<double, 9> NormalEquations::point_prior_root(std::size_t point) const
   return *whitening(problem_.terms.points[static_cast<std::size_t>(prior_[point])].covariance);
 }
 
-void NormalEquations::point(std::size_t index, Point& out) const {
+void NormalEquations::point(std::size_t index, Point& out, const Visit& visit) const {
   out.V = {};
   out.blocks.clear();
   out.W.clear();
@@ -227,6 +227,7 @@ void NormalEquations::point(std::size_t index, Point& out) const {
   for (const std::uint64_t* i = begin_of(index); i != end_of(index); ++i) {
     rows_.evaluate(*i, row);
     const double w = weight_of(row);
+    if (visit) visit(row, w);
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t b = 0; b < 3; ++b)
         out.V[3 * a + b] += w * (row.point[a] * row.point[b] + row.point[3 + a] * row.point[3 + b]);
@@ -277,26 +278,27 @@ void NormalEquations::eliminate(const Point& point) {
   });
 }
 
+void NormalEquations::measure(const ObservationRows::Row& row) {
+  const double s = row.r[0] * row.r[0] + row.r[1] * row.r[1];
+  const LossValue<double> rho =
+      loss_.kind == LossKind::none ? LossValue<double>{s, 1, 0} : evaluate_loss(loss_, s);
+  ++moments_.observations;
+  moments_.square += rho.first * rho.first * s;
+  moments_.weight += rho.first;
+  moments_.slope += rho.first + s * rho.second;
+  moments_.weight_square += rho.first * rho.first;
+  moments_.slope_square += slope_square(rho, s);
+}
+
 void NormalEquations::add_points() {
-  ObservationRows::Row row;
   Point of;
+  const Visit add = [this](const ObservationRows::Row& row, double weight) {
+    measure(row);
+    add_observation(row, weight);
+  };
   for (std::size_t p = 0; p < problem_.num_points(); ++p) {
-    for (const std::uint64_t* i = begin_of(p); i != end_of(p); ++i) {
-      rows_.evaluate(*i, row);
-      const double s = row.r[0] * row.r[0] + row.r[1] * row.r[1];
-      const LossValue<double> rho =
-          loss_.kind == LossKind::none ? LossValue<double>{s, 1, 0} : evaluate_loss(loss_, s);
-      ++moments_.observations;
-      moments_.square += rho.first * rho.first * s;
-      moments_.weight += rho.first;
-      moments_.slope += rho.first + s * rho.second;
-      moments_.weight_square += rho.first * rho.first;
-      moments_.slope_square += slope_square(rho, s);
-      add_observation(row, rho.first);
-    }
-    if (points_held_) continue;
-    point(p, of);
-    if (!of.seen) continue;
+    point(p, of, add);
+    if (points_held_ || !of.seen) continue;
     ++eliminated_;
     eliminate(of);
     if (prior_.empty() || prior_[p] < 0) continue;

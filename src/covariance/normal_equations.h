@@ -61,8 +61,9 @@ class NormalEquations {
   bool points_held() const { return points_held_; }
   double weight_of(const ObservationRows::Row& row) const;
 
-  /// Linearises a point again.
-  void point(std::size_t index, Point& out) const;
+  /// Linearises a point again; visit(row, weight), where it is given, sees its observations' rows.
+  using Visit = std::function<void(const ObservationRows::Row& row, double weight)>;
+  void point(std::size_t index, Point& out, const Visit& visit = {}) const;
   /// Its observations; none of a kept one.
   const std::uint64_t* begin_of(std::size_t point) const { return order_.data() + first_[point]; }
   const std::uint64_t* end_of(std::size_t point) const { return order_.data() + first_[point + 1]; }
@@ -86,6 +87,7 @@ class NormalEquations {
   void make_pattern();
   void add_terms();
   void add_points();
+  void measure(const ObservationRows::Row& row);
   void add_observation(const ObservationRows::Row& row, double weight);
   void eliminate(const Point& point);
   std::array<double, 9> point_prior_root(std::size_t point) const;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "geometry/camera_model.h"
+#include "platform/real_text.h"
 #include "starts/bearing.h"
 #include "starts/sights.h"
 
@@ -53,12 +54,6 @@ std::vector<Reach> reach_of(const Problem& problem) {
   return out;
 }
 
-std::string number(double x) {
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.4g", x);
-  return buffer;
-}
-
 /// What is found of one lens, with how far it is beyond its limit.
 class LensWeakness {
  public:
@@ -92,9 +87,10 @@ class LensWeakness {
     if (!(s > limit)) return;
     std::string words = std::string(names_[p]) + of() + " is not determined";
     if (std::isfinite(s))
-      words += ": its sigma " + number(s) +
-               (focal || centre ? std::string(" px")
-                                : " moves a pixel by up to " + number(s * reach_[p]) + " px");
+      words +=
+          ": its sigma " + few_digits(s, 4) +
+          (focal || centre ? std::string(" px")
+                           : " moves a pixel by up to " + few_digits(s * reach_[p], 4) + " px");
     to.push_back({s / limit, {words, index_, {p}, s, 0}});
   }
   void find_pair(std::uint32_t a, std::uint32_t b,

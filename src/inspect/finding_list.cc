@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
+
+#include "platform/real_text.h"
 
 namespace sheaf {
 
@@ -21,10 +22,6 @@ std::string plural(std::uint64_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-std::string shown(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
+std::string shown(double x) { return few_digits(x, 3); }
 
 }  // namespace sheaf

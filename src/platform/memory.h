@@ -3,11 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace sheaf {
 
 /// Resident size of this process now, and its peak so far; 0 where the system does not say.
 std::uint64_t resident_bytes();
 std::uint64_t peak_resident_bytes();
+
+/// "12 MB", rounded up: for people.
+std::string megabytes(std::uint64_t bytes);
 
 }  // namespace sheaf

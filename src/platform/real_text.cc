@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace sheaf {
 
@@ -19,6 +20,12 @@ std::from_chars_result read_real(const char* begin, const char* end, double& val
     return {stop, std::errc::result_out_of_range};
   value = read;
   return {stop, error};
+}
+
+std::string few_digits(double x, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, x);
+  return text;
 }
 
 }  // namespace sheaf

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <charconv>
+#include <string>
 
 namespace sheaf {
 
@@ -10,5 +11,8 @@ namespace sheaf {
 /// number that [begin, end) starts with, rounded to the nearest double. A number beyond the range
 /// of doubles is std::errc::result_out_of_range; "inf" and "nan" are what they say.
 std::from_chars_result read_real(const char* begin, const char* end, double& value);
+
+/// For people: at most so many digits that count.
+std::string few_digits(double x, int digits);
 
 }  // namespace sheaf

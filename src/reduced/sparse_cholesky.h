@@ -33,14 +33,13 @@ class SparseCholesky {
   /// reordering. The two must be coupled. Swapped where that order puts the column below the row.
   std::uint64_t offset(std::int32_t row, std::int32_t column) const;
   double* panels() { return panels_.data(); }
+  const double* panels() const { return panels_.data(); }
 
   /// False where the matrix is not positive definite to rounding; or where it was cancelled, which
   /// the calling thread asks first and then once for each supernode it works at.
   bool factor(Threads& threads, const Fill& fill, const std::function<bool()>* cancelled = nullptr);
   /// x <- A^-1 x, after factor().
   void solve(double* x);
-  /// The diagonal of L, by columns as they were before the reordering.
-  double pivot(std::int32_t column) const { return 1 / inverse_[symbolic_.position[column]]; }
   /// Puts the entries of A^-1 in the place of those of the factor, after factor(); the factor is
   /// gone (selected_inverse.cc). Throws std::bad_alloc.
   void invert(Threads& threads);

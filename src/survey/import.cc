@@ -228,15 +228,23 @@ class TableReading {
   std::array<int, kColumns> place_{};
 };
 
-}  // namespace
-
-Result<Constraints> parse_gcp_list(const std::string& text, const std::string& name) {
-  LineCursor lines(text, name);
+/// What the first line says.
+Result<Constraints> begin_list(LineCursor& lines, const std::string& name) {
   const Result<WorldFrame> frame = read_frame_line(lines);
   if (!frame.ok()) return frame.error();
   Constraints out;
   out.paths = {name};
   out.frame = frame.value();
+  return out;
+}
+
+}  // namespace
+
+Result<Constraints> parse_gcp_list(const std::string& text, const std::string& name) {
+  LineCursor lines(text, name);
+  Result<Constraints> begun = begin_list(lines, name);
+  if (!begun.ok()) return begun;
+  Constraints& out = begun.value();
   std::map<std::string, std::size_t> by_id;
   std::map<std::array<double, 3>, std::string> id_of_place;
   while (lines.next_record()) {
@@ -272,16 +280,14 @@ Result<Constraints> parse_gcp_list(const std::string& text, const std::string& n
     }
     out.points[found->second].marks.push_back(mark);
   }
-  return out;
+  return begun;
 }
 
 Result<Constraints> parse_geo_txt(const std::string& text, const std::string& name) {
   LineCursor lines(text, name);
-  const Result<WorldFrame> frame = read_frame_line(lines);
-  if (!frame.ok()) return frame.error();
-  Constraints out;
-  out.paths = {name};
-  out.frame = frame.value();
+  Result<Constraints> begun = begin_list(lines, name);
+  if (!begun.ok()) return begun;
+  Constraints& out = begun.value();
   bool angles = false;
   while (lines.next_record()) {
     ImagePosition p;
@@ -307,7 +313,7 @@ Result<Constraints> parse_geo_txt(const std::string& text, const std::string& na
     out.positions.push_back(p);
   }
   if (angles) out.notes.push_back("angles of geo.txt are not used");
-  return out;
+  return begun;
 }
 
 Result<Constraints> parse_position_table(const std::string& text, const std::string& name) {

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <optional>
 
 #include "io/line_cursor.h"
+#include "platform/real_text.h"
 #include "scene/rigs.h"
 #include "starts/sights.h"
 #include "survey/file_place.h"
@@ -24,11 +24,7 @@ constexpr double kInPlaceSigmas = 10;
 // Doubles of this size are 1.5e-11 apart.
 constexpr double kFarFromZero = 1e5;
 
-std::string figures(double x, int digits = 6) {
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.*g", digits, x);
-  return buffer;
-}
+std::string figures(double x) { return few_digits(x, 6); }
 std::string counted(std::size_t n, const std::string& what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
@@ -248,7 +244,8 @@ class Placing {
     out_.words.push_back(why +
                          ": the model, which counts in the survey's coordinates, stays there; it "
                          "is written less their origin " +
-                         figures(o[0], 15) + " " + figures(o[1], 15) + " " + figures(o[2], 15));
+                         few_digits(o[0], 15) + " " + few_digits(o[1], 15) + " " +
+                         few_digits(o[2], 15));
     return true;
   }
 

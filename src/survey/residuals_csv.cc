@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "io/csv_field.h"
 #include "sheaf/survey.h"
 
 namespace sheaf {
@@ -13,21 +14,14 @@ std::string shortest(double x) {
   return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, x).ptr);
 }
 
-std::string quoted_field(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
 void add_lines(const char* kind, const std::vector<SurveyResidual>& list, std::string& out) {
   for (const SurveyResidual& r : list) {
-    out += kind + ("," + quoted_field(r.name)) + ",";
+    out += kind + ("," + csv_field(r.name)) + ",";
     for (const auto& three : {r.residual, r.sigma, r.adjusted})
       for (const double x : three) out += "," + shortest(x);
     out += ",,,," + shortest(r.worst_sigmas) + (r.blunder ? ",1\n" : ",0\n");
     for (const MarkResidual& mark : r.marks)
-      out += std::string(kind) + "-mark," + quoted_field(r.name) + "," + quoted_field(mark.image) +
+      out += std::string(kind) + "-mark," + csv_field(r.name) + "," + csv_field(mark.image) +
              std::string(10, ',') + shortest(mark.residual_px[0]) + "," +
              shortest(mark.residual_px[1]) + "," + shortest(mark.sigma_px) + ",,\n";
   }
@@ -43,7 +37,7 @@ std::string residuals_csv(const SurveyReport& report) {
   add_lines("control", report.control, out);
   add_lines("check", report.check, out);
   for (const DistanceResidual& d : report.distances)
-    out += "distance," + quoted_field(d.first + " to " + d.second) + ",," + shortest(d.residual) +
+    out += "distance," + csv_field(d.first + " to " + d.second) + ",," + shortest(d.residual) +
            ",,," + shortest(d.sigma) + std::string(9, ',') +
            shortest(std::abs(d.residual) / d.sigma) + (d.blunder ? ",1\n" : ",0\n");
   return out;

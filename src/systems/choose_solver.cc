@@ -55,10 +55,6 @@ bool takes_mixed(SolverKind kind, const WorkCounts& counts, const SolveOptions& 
   return prefers_mixed(kind) && !loses_parallax(kind, options.points);
 }
 
-std::string megabytes(std::uint64_t bytes) {
-  return std::to_string((bytes + 999999) / 1000000) + " MB";
-}
-
 /// An analysis, which may be large, is made again where it is needed.
 std::shared_ptr<const WorkCounts> to_think_over(const WorkCounts& counts, SolverKind kind,
                                                 const SolveOptions& options) {
