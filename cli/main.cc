@@ -6,6 +6,6 @@ int main(int argc, char** argv) {
   using namespace sheaf;
   return run_command_line(argc, argv,
                           {solve_verb(), info_verb(), check_verb(), convert_verb(), perturb_verb(),
-                           evaluate_verb(), align_verb(), covariance_verb(), compare_verb(),
-                           photometric_verb(), generate_verb(), demo_verb()});
+                           evaluate_verb(), align_verb(), covariance_verb(), calibrate_verb(),
+                           compare_verb(), photometric_verb(), generate_verb(), demo_verb()});
 }
