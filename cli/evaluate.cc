@@ -8,7 +8,6 @@
 
 #include "errors_document.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "matching_document.h"
 #include "outputs.h"
@@ -28,10 +27,7 @@ struct Arguments {
 };
 
 void write_csv(const ErrorLists& lists, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(errors_csv(lists));
-  file.value().commit().value();
+  write_text(errors_csv(lists), path);
 }
 
 Json alignment_json(const StateAlignment& a) {

@@ -11,7 +11,6 @@
 #include "image/png.h"
 #include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
@@ -50,10 +49,7 @@ PatternCounts write_pattern(const Problem& problem, const std::string& name,
       draw_patterns(problem,
                     std::filesystem::path(name).filename().string() + ": " + counts_text(problem))
           .value();
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(encode_png(figure.image).value());
-  file.value().commit().value();
+  write_text(encode_png(figure.image).value(), path);
   const PatternCounts& c = figure.counts;
   fmt::print("network     {} pairs of images with points in common, {:.3g}% of all\n", c.links,
              100 * c.fill);

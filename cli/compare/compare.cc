@@ -16,7 +16,6 @@
 #include "compare/solver_run.h"
 #include "exit_code.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "program.h"
@@ -88,10 +87,7 @@ void write_plot(const Arguments& arguments, const ComparisonRecord& record,
   for (const std::size_t i : median_runs(record.runs))
     if (const SolverRun& run = record.runs[i]; run.ran())
       curves.emplace_back(run.solver + " " + run.config, run.trace);
-  Result<OutputFile> file = OutputFile::create(arguments.plot, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(cost_plot(title, curves, record.best));
-  file.value().commit().value();
+  write_text(cost_plot(title, curves, record.best), arguments.plot);
 }
 
 Json list_json(const std::vector<std::string>& items) {

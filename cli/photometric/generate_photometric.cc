@@ -67,7 +67,9 @@ std::vector<BoundOption> options_of(PhotometricSceneArguments& arguments) {
 int generate_photometric(const PhotometricSceneOptions& options, const std::string& out,
                          const std::string& truth, const std::string& json) {
   const Timer total;
-  check_outputs({{"--json", json}});
+  check_outputs({{.option = "OUT", .path = out, .folder = true},
+                 {.option = "--truth", .path = truth, .folder = true},
+                 {"--json", json}});
   PhotometricScene made = generate(options).value();
   if (!truth.empty()) write_folder(std::move(made.truth), truth);
   write_folder(std::move(made.start), out);

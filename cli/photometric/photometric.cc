@@ -55,7 +55,8 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
-  PhotometricOutputs outputs(arguments.outputs, arguments.common.json);
+  PhotometricOutputs outputs(arguments.outputs, arguments.common.json,
+                             {arguments.in, arguments.photometric.read.images.string()});
   PhotometricFolder folder = read_photometric(arguments.in, arguments.photometric.read).value();
   std::optional<PoseErrors> before, after;
   if (!folder.given_poses.empty()) before = pose_errors(folder);
