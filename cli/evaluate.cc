@@ -14,6 +14,7 @@
 #include "report/errors.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -53,15 +54,15 @@ int run(const Arguments& arguments) {
                                               : AlignBy::least_squares;
   const ErrorLists lists = list_errors(estimate.problem, reference.problem, align_by).value();
   if (!arguments.no_align && !lists.alignment.aligned && !arguments.common.quiet)
-    std::fputs("neither camera centres nor points determine an alignment: compared as they are\n",
+    print_text("neither camera centres nor points determine an alignment: compared as they are\n",
                stderr);
   interrupt.begin_write();
   if (!arguments.csv.empty()) write_csv(lists, arguments.csv);
-  fmt::print(
-      "{} against {}: {}\n{}{}", arguments.estimate, arguments.reference,
-      counts_text(estimate.problem),
-      matching_text(lists.matching, estimate.problem, reference.problem, "estimate", "reference"),
-      errors_text(lists));
+  print_out("{} against {}: {}\n{}{}", arguments.estimate, arguments.reference,
+            counts_text(estimate.problem),
+            Lines{matching_text(lists.matching, estimate.problem, reference.problem, "estimate",
+                                "reference")},
+            Lines{errors_text(lists)});
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION},
                    {"estimate", input_json(arguments.estimate, estimate)},

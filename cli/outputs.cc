@@ -12,6 +12,7 @@
 #include "io/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
+#include "terminal.h"
 
 namespace sheaf {
 
@@ -108,7 +109,7 @@ std::uint64_t bytes_at(const std::string& path) {
 
 void print_losses(const std::string& format, const Problem& problem) {
   for (const std::string& sentence : lost_in(format, problem))
-    fmt::print("dropped     {}\n", sentence);
+    print_out("dropped     {}\n", sentence);
 }
 
 void write_text(const std::string& text, const std::string& path) {

@@ -76,6 +76,7 @@ Result<OutputFile> OutputFile::create(const fs::path& target, Compression compre
     if (!partial.ok()) return partial.error();
     out.partial_ = std::move(partial.value().path);
     out.fd_ = partial.value().fd;
+    remember_partial(out.partial_);
     if (exists) take_attributes(out.fd_, status);
   }
   if (out.fd_ < 0) return unwritable(target, errno);
@@ -111,6 +112,7 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
 OutputFile::~OutputFile() {
   close_compressor();
   // Unlinked first: the lock must outlast the name.
+  if (!partial_.empty()) forget_partial(partial_);
   for (const fs::path* path : {&partial_, &new_})
     if (!path->empty()) ::unlink(path->c_str());
   if (fd_ >= 0) ::close(fd_);
@@ -212,6 +214,7 @@ Result<void> OutputFile::commit() {
 Result<void> OutputFile::replace() {
   new_.clear();
   if (partial_.empty()) return {};
+  forget_partial(partial_);  // the name may be another process's as soon as it is free
   if (::rename(partial_.c_str(), target_.c_str()) != 0) return unwritable(shown_, errno);
   partial_.clear();
   if (const int error = sync_folder(target_.parent_path())) return unwritable(shown_, error);

@@ -7,6 +7,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -79,7 +81,38 @@ Result<Partial> claim(const fs::path& target, const fs::path& shown, const Make&
                     partial_name(target, 0).string() + " and those behind it are in the way");
 }
 
+/// Names of partial files, where a signal handler can read them.
+struct Remembered {
+  std::atomic<bool> taken{false}, readable{false};
+  char path[1024] = "";
+};
+std::array<Remembered, 16> remembered;
+
 }  // namespace
+
+void remember_partial(const fs::path& path) noexcept {
+  if (path.native().size() >= sizeof Remembered::path) return;
+  for (Remembered& at : remembered) {
+    if (at.taken.exchange(true)) continue;
+    std::strcpy(at.path, path.c_str());
+    at.readable = true;
+    return;
+  }
+}
+
+void forget_partial(const fs::path& path) noexcept {
+  for (Remembered& at : remembered) {
+    if (!at.readable || path.native() != at.path) continue;
+    at.readable = false;
+    at.taken = false;
+    return;
+  }
+}
+
+void unlink_partial_files() noexcept {
+  for (const Remembered& at : remembered)
+    if (at.readable) ::unlink(at.path);
+}
 
 Error unwritable(const fs::path& path, const std::string& why) {
   return Error(ErrorCode::unwritable_output, path.string() + ": cannot be written: " + why);

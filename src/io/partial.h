@@ -25,6 +25,13 @@ Result<Partial> claim_partial_file(const std::filesystem::path& target, mode_t m
 Result<Partial> claim_partial_folder(const std::filesystem::path& target, mode_t mode,
                                      const std::filesystem::path& shown);
 
+/// Until `forget_partial`, a signal handler that ends the process may remove the file first, by
+/// `unlink_partial_files`, which neither waits nor allocates. Only so many files are remembered;
+/// what is left beside is cleaned by the next claim.
+void remember_partial(const std::filesystem::path& path) noexcept;
+void forget_partial(const std::filesystem::path& path) noexcept;
+void unlink_partial_files() noexcept;
+
 /// "PATH: cannot be written: why", ErrorCode::unwritable_output.
 Error unwritable(const std::filesystem::path& path, const std::string& why);
 Error unwritable(const std::filesystem::path& path, int error);
