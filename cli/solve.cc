@@ -179,6 +179,14 @@ void say(const Arguments& arguments, const InputFile& input, const SolveRecord& 
               record.after.cost, summary.final_plain_cost);
 }
 
+// A checkpoint that is gone on from may be the one that is written.
+std::vector<std::string> inputs_of(const Arguments& arguments) {
+  const SolveOptions& options = arguments.solve.options;
+  std::vector<std::string> own = {arguments.in, arguments.rigs.path};
+  if (options.resume != options.checkpoint) own.push_back(options.resume);
+  return with_survey(std::move(own), arguments.constraints);
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
@@ -187,8 +195,9 @@ int run(Arguments& arguments) {
                  {"--json", arguments.common.json},
                  {"--ply", arguments.ply},
                  {"--residuals", arguments.constraints.residuals},
-                 {"--sigmas", arguments.sigmas}},
-                with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
+                 {"--sigmas", arguments.sigmas},
+                 {"--checkpoint", arguments.solve.options.checkpoint}},
+                inputs_of(arguments));
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
   check_holds(problem, arguments.out);

@@ -55,6 +55,10 @@ std::string summary_text(const Summary& s, double read_s) {
     out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
   out += fmt::format("iterations  {}{}\n", steps,
                      rejected > 0 ? fmt::format(" ({} rejected)", rejected) : "");
+  if (s.resumed_after >= 0)
+    out += fmt::format("resumed     after step {} of a checkpoint\n", s.resumed_after);
+  if (!s.checkpoint_failure.empty())
+    out += fmt::format("note        no checkpoint could be written: {}\n", s.checkpoint_failure);
   for (const Recovery& r : s.recoveries)
     out += fmt::format(
         "recovery    after step {}: {} passes of resection and intersection, {}, cost {:.6g} -> "

@@ -117,6 +117,10 @@ struct Summary {
   double setup_s = 0;  ///< sorting, indexing, allocating
   double solve_s = 0;  ///< after set-up
 
+  int resumed_after = -1;  ///< the step after which a checkpoint was gone on from; -1: none was
+  int checkpoints = 0;     ///< written by this process
+  std::string checkpoint_failure;  ///< why one could not be; empty: none failed
+
   std::vector<std::uint64_t> behind_camera_before;  ///< observation indices
   std::vector<std::uint64_t> behind_camera_after;
   std::vector<std::uint64_t> rejected_observations;  ///< left out (Cheirality::hold_out)

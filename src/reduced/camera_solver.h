@@ -74,7 +74,8 @@ class CameraSolver {
   virtual CameraSolution shorten(const CameraSystem&, Buffer<double>&) { return {}; }
   /// What one solve leaves to the next; nothing, unless it iterates.
   virtual RecycledModes::History history() const { return {}; }
-  virtual void restore(const RecycledModes::History&) {}
+  /// False where it is of another system.
+  virtual bool restore(const RecycledModes::History&) { return true; }
   virtual std::uint64_t bytes() const = 0;
 };
 

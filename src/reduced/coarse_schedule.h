@@ -43,6 +43,11 @@ class CoarseSchedule {
   /// The cost of the state that a step went to.
   void moved(double cost) { cost_ = cost; }
 
+  template <class Archive>
+  void fields(Archive& a) {
+    a(matrix_, summed_, cost_, summed_cost_, summed_lambda_, iterations_, first_iterations_);
+  }
+
  private:
   /// (S + D) scaled to a unit diagonal has no eigenvalue below this, so that the first part of the
   /// preconditioner is enough: the first step from afar needs as many iterations without E.

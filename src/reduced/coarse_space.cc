@@ -332,12 +332,16 @@ CoarseSpace::History CoarseSpace::history() const {
           {own_.begin(), own_.end()}};
 }
 
-void CoarseSpace::restore(const History& history) {
+bool CoarseSpace::restore(const History& history) {
+  if (history.basis.size() != basis_.size() || history.row_basis.size() != row_basis_.size() ||
+      history.sums.size() != kCoarseTile * tiles_ || history.own.size() != own_.size())
+    return false;
   schedule_ = history.schedule;
   std::copy(history.basis.begin(), history.basis.end(), basis_.begin());
   std::copy(history.row_basis.begin(), history.row_basis.end(), row_basis_.begin());
   std::copy(history.sums.begin(), history.sums.end(), sums_.begin());
   std::copy(history.own.begin(), history.own.end(), own_.begin());
+  return true;
 }
 
 std::uint64_t CoarseSpace::bytes() const {

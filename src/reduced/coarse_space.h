@@ -59,7 +59,8 @@ class CoarseSpace {
     std::vector<double> basis, row_basis, sums, own;
   };
   History history() const;
-  void restore(const History& history);
+  /// False, and nothing done, where it is of another space.
+  bool restore(const History& history);
 
   std::int32_t num_clusters() const { return clusters_.count; }
   /// Z of a solved block: rows 0..6 of its nine x modes, row-major.

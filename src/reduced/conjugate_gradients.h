@@ -82,7 +82,7 @@ class ConjugateGradients {
   CameraSolution shorten(const CameraSystem& system, Buffer<double>& x);
 
   RecycledModes::History history() const { return modes_.history(); }
-  void restore(const RecycledModes::History& history) { modes_.restore(history); }
+  bool restore(const RecycledModes::History& history) { return modes_.restore(history); }
 
   std::uint64_t bytes() const;
 

@@ -160,7 +160,7 @@ class ExplicitSolver : public CameraSolver {
     return cg_.shorten(system, x);
   }
   RecycledModes::History history() const override { return cg_.history(); }
-  void restore(const RecycledModes::History& history) override { cg_.restore(history); }
+  bool restore(const RecycledModes::History& history) override { return cg_.restore(history); }
   std::uint64_t bytes() const override {
     return (rounded_ ? rounded_->bytes() : exact_->bytes()) + blocks_.bytes() + cg_.bytes();
   }

@@ -100,13 +100,17 @@ RecycledModes::History RecycledModes::history() const {
   return out;
 }
 
-void RecycledModes::restore(const History& history) {
+bool RecycledModes::restore(const History& history) {
+  if (history.kept > kMost || history.next >= kMost || history.weights.size() > kMost ||
+      history.weights.size() < history.kept || history.modes.size() != history.kept * length_)
+    return false;
   kept_ = history.kept;
   next_ = history.next;
   weight_ = history.weights;
-  if (kept_ == 0) return;
+  if (kept_ == 0) return true;
   if (modes_.size() == 0) modes_.allocate(kMost * length_);
   std::copy(history.modes.begin(), history.modes.end(), modes_.begin());
+  return true;
 }
 
 }  // namespace sheaf

@@ -40,8 +40,8 @@ class RecycledModes {
     std::vector<double> weights;  ///< of each mode
   };
   History history() const;
-  /// Of modes of the same length, as history() gave it.
-  void restore(const History& history);
+  /// As history() gave it. False, and nothing done, for modes of another length.
+  bool restore(const History& history);
 
   std::size_t count() const { return kept_; }
   std::uint64_t bytes() const { return basis_.bytes() + modes_.bytes(); }

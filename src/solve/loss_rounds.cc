@@ -52,8 +52,14 @@ class Rounds {
   bool restarts() const { return restarts_; }
 
   void run() {
-    begin();
-    for (int returns = 0;; ++returns) {
+    RunProgress* const progress = hooks_ != nullptr ? hooks_->progress : nullptr;
+    const bool resumes = progress != nullptr && progress->resumes;
+    if (resumes)
+      provisional_ = progress->provisional;
+    else
+      begin();
+    for (int returns = resumes ? progress->returns : 0;; ++returns) {
+      if (progress != nullptr) progress->returns = returns;
       while (provisional_) {
         descend(kOneStep);
         if (restarts_) return;
@@ -138,7 +144,13 @@ class Rounds {
   void descend(double tolerance) {
     SolveOptions options = options_;
     options.tolerance = tolerance;
-    const std::size_t before = summary_.iterations.size();
+    std::size_t before = summary_.iterations.size();
+    if (hooks_ != nullptr && hooks_->progress != nullptr) {
+      RunProgress& progress = *hooks_->progress;
+      if (progress.resumes) before = progress.round_begin;
+      progress.round_begin = before;
+      progress.provisional = provisional_;
+    }
     restarts_ = minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_,
                          summary_, std::numeric_limits<double>::infinity(), history_, hooks_);
     const std::size_t after = summary_.iterations.size();

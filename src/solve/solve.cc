@@ -16,6 +16,7 @@
 #include "scene/behind.h"
 #include "scene/rigs.h"
 #include "scene/terms.h"
+#include "solve/checkpoint.h"
 #include "solve/endings.h"
 #include "solve/loss_rounds.h"
 #include "solve/recovery.h"
@@ -130,19 +131,44 @@ class Attempts {
   Attempts(Problem& problem, const SolveOptions& options, const Kernels& kernels,
            const Stopwatch& clock, Summary& summary)
       : problem_(problem),
+        asked_(options),
         options_(options),
         kernels_(kernels),
         clock_(clock),
         summary_(summary),
         threads_(options.threads),
         skip_(held_out(problem, options, threads_, summary)),
-        used_(problem.num_observations() - summary.rejected_observations.size()) {
+        used_(problem.num_observations() - summary.rejected_observations.size()),
+        fingerprint_(options.checkpoint.empty() ? "" : fingerprint(problem, options.fixed)) {
     if (options_.initial_damping == 0)
       options_.initial_damping = default_damping(problem.num_images());
   }
 
+  /// Goes on from where another process was.
+  void resume(Checkpoint from) {
+    const std::vector<std::uint64_t> left_out = std::move(summary_.rejected_observations);
+    const TermCosts terms = summary_.initial_terms;
+    summary_ = std::move(from.summary);
+    summary_.rejected_observations = left_out;
+    summary_.initial_terms = terms;
+    summary_.simd = kernels_.name;
+    summary_.threads = threads_.count();
+    summary_.resumed_after = summary_.iterations.back().index;
+    options_.recoveries = from.recoveries;
+    options_.solver = from.solver;
+    options_.initial_damping = from.initial_damping;
+    history_ = from.loop;
+    progress_ = from.progress;
+    progress_.resumes = true;
+    put(from.attempt_start, problem_);
+    held_ = std::move(from.cameras);
+    points_ = std::move(from.points);
+    home_ = std::move(from.home);
+    if (options_.on_plan) options_.on_plan(summary_);
+  }
+
   Result<void> run() {
-    for (bool first = true;; first = false) {
+    for (bool first = !held_.has_value();; first = false) {
       const Result<void> done = attempt(first);
       if (done.ok() && !better_) tell_ending();
       if (!done.ok() || !better_) return done;
@@ -164,12 +190,15 @@ class Attempts {
       if (first && build.lends()) summary_.behind_camera_before = behind_camera(problem_, threads_);
       std::optional<LentObservations> lent;
       if (build.lends()) build.lend(problem_, lent);
-      const std::unique_ptr<Home> home = build.make_home(problem_);
+      const Result<std::unique_ptr<Home>> made = make_home(build);
+      if (!made.ok()) return made.error();
+      const std::unique_ptr<Home>& home = made.value();
       if (first && !build.lends() && home->count_behind() > 0)
         summary_.behind_camera_before = behind_camera(problem_, threads_);
-      if (first) summary_.setup_s = clock_.seconds();
+      if (first || summary_.resumed_after >= 0) summary_.setup_s = clock_.seconds();
       const Hooks hooks{[&] { return find_better(build, *home); },
-                        [&](double iterations) { return change_solver(build, *home, iterations); }};
+                        [&](double iterations) { return change_solver(build, *home, iterations); },
+                        &progress_, [&] { write_down(*home); }};
       restarts = minimize_in_rounds(*home, options_, clock_, summary_, &history_, &hooks);
       if (!restarts) build.store(*home, problem_);
       behind_after = !restarts && home->count_behind() > 0;
@@ -182,6 +211,49 @@ class Attempts {
     summary_.solve_s = clock_.seconds() - summary_.setup_s;
     if (behind_after) summary_.behind_camera_after = behind_camera(problem_, threads_);
     return {};
+  }
+
+  /// Of the problem's state, or of a checkpoint's, which was reached from it.
+  Result<std::unique_ptr<Home>> make_home(Build& build) {
+    if (!held_) return build.make_home(problem_);
+    std::unique_ptr<Home> home;
+    if (build.fits(*held_, problem_)) {
+      problem_.points.swap(points_);
+      home = build.make_home(problem_, &*held_);
+      problem_.points.swap(points_);
+    }
+    held_.reset();
+    if (home == nullptr || !home->restore(home_))
+      return Error(ErrorCode::unreadable_input,
+                   options_.resume + ": the checkpoint does not hold what it should");
+    return home;
+  }
+
+  /// A checkpoint, where it is time for one. A run that is to stop leaves where it stands.
+  void write_down(const Home& home) {
+    if (options_.checkpoint.empty() || !history_) return;
+    const double now = clock_.seconds();
+    if (!out_of_time() && now - written_s_ < options_.checkpoint_every_s) return;
+    Checkpoint out;
+    out.problem = fingerprint_;
+    put_options(asked_, kernels_.name, out);
+    out.summary = summary_;
+    out.loop = *history_;
+    out.progress = progress_;
+    out.home = home.history();
+    out.attempt_start = estimate_of(problem_);
+    out.cameras = home.cameras();
+    out.points = problem_.points;
+    home.store_points(out.points);
+    out.recoveries = options_.recoveries;
+    out.solver = options_.solver;
+    out.initial_damping = options_.initial_damping;
+    const Result<void> done = write_checkpoint(out, options_.checkpoint);
+    if (done.ok())
+      ++summary_.checkpoints;
+    else
+      summary_.checkpoint_failure = done.error().what();
+    written_s_ = clock_.seconds();
   }
 
   void tell_ending() {
@@ -279,7 +351,8 @@ class Attempts {
   }
 
   Problem& problem_;
-  SolveOptions options_;
+  const SolveOptions& asked_;
+  SolveOptions options_;  ///< with what the run changes
   const Kernels& kernels_;
   const Stopwatch& clock_;
   Summary& summary_;
@@ -290,6 +363,13 @@ class Attempts {
   Estimate start_, reached_;        ///< of the attempt, when a better one was sought
   bool seeks_ = false;              ///< a better one is to be sought once the home is gone
   std::optional<LoopHistory> history_;
+  const std::string fingerprint_;
+  RunProgress progress_;
+  double written_s_ = 0;  ///< when the last checkpoint was
+  // Of a checkpoint, until its home is made.
+  std::optional<CameraState> held_;
+  std::vector<double> points_;
+  HomeHistory home_;
 };
 
 }  // namespace
@@ -302,10 +382,20 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   place_images(problem);
+  std::optional<Checkpoint> from;
+  if (!options.resume.empty()) {
+    Checkpoint expected;
+    expected.problem = fingerprint(problem, options.fixed);
+    put_options(options, kernels.value()->name, expected);
+    Result<Checkpoint> read = read_checkpoint(options.resume, expected, problem);
+    if (!read.ok()) return read.error();
+    from = std::move(read).value();
+  }
   summary.initial_terms = evaluate_terms(problem);
   const double rms_before_px = plain_rms_px(problem);
   try {
     Attempts attempts(problem, options, *kernels.value(), clock, summary);
+    if (from) attempts.resume(std::move(*from));
     const Result<void> done = attempts.run();
     if (!done.ok()) return done.error();
   } catch (const std::bad_alloc&) {

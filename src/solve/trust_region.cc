@@ -54,7 +54,16 @@ class Loop {
                  loss.kind != LossKind::none) {}
 
   bool restarts() const { return restarts_; }
-  void may_ask(const Hooks* hooks) { hooks_ = hooks; }
+  void may_ask(const Hooks* hooks) {
+    hooks_ = hooks;
+    if (hooks == nullptr || hooks->progress == nullptr || !hooks->progress->resumes) return;
+    RunProgress& from = *hooks->progress;
+    from.resumes = false;
+    rejected_in_a_row_ = from.rejected_in_a_row;
+    any_finite_trial_ = from.any_finite_trial;
+    attempt_begin_ = from.attempt_begin;
+    last_iterations_ = from.last_iterations;
+  }
 
   /// Goes on from what is there, and leaves what there is after each step.
   void keep(std::optional<LoopHistory>* history) {
@@ -74,6 +83,7 @@ class Loop {
 
   void run() {
     while (!done_) {
+      tell_progress();
       loss_.floor = control_.curvature_floor();
       const Step step =
           system_.propose({control_.damping(), forcing_, loss_, last_decrease_, stretch_,
@@ -97,6 +107,16 @@ class Loop {
   }
 
  private:
+  void tell_progress() {
+    if (hooks_ == nullptr || hooks_->progress == nullptr || !begun_) return;
+    RunProgress& to = *hooks_->progress;
+    to.rejected_in_a_row = rejected_in_a_row_;
+    to.any_finite_trial = any_finite_trial_;
+    to.attempt_begin = attempt_begin_;
+    to.last_iterations = last_iterations_;
+    if (hooks_->before_step) hooks_->before_step();
+  }
+
   /// The start: nothing tried yet. Later rounds go on from where the one before ended.
   void begin(const Step& step) {
     begun_ = true;

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "platform/clock.h"
 #include "sheaf/options.h"
@@ -43,6 +45,21 @@ struct LoopHistory {
   }
 };
 
+/// Where a run stands beside what LoopHistory says. Those who know keep it up, so that it can be
+/// written down before any step; where `resumes` is set they take it up again.
+struct RunProgress {
+  bool resumes = false;
+  // The rounds of a loss.
+  bool provisional = false;
+  int returns = 0;
+  std::uint64_t round_begin = 0;  ///< iterations there were when its steps began
+  // The steps of an attempt.
+  int rejected_in_a_row = 0;
+  bool any_finite_trial = false;
+  std::vector<int> last_iterations;
+  std::uint64_t attempt_begin = 0;
+};
+
 /// What is to be done where an early step went wrong: go on, start again from a better state that
 /// was found, or end, since no gain could be seen.
 enum class Recourse { none, restart, end };
@@ -53,6 +70,9 @@ struct Hooks {
   /// Whether another camera solver is to go on, given how many conjugate gradient iterations the
   /// last steps took.
   std::function<bool(double iterations)> change_solver;
+  RunProgress* progress = nullptr;
+  /// Before each step but the first of a run; `progress` is up to date.
+  std::function<void()> before_step{};
 };
 
 /// Levenberg-Marquardt or a dogleg, with gain-ratio control, on any System, with one loss. Adds to

@@ -215,10 +215,18 @@ CameraState Build::cameras(const Problem& problem) const {
   return out;
 }
 
-std::unique_ptr<Home> Build::make_home(const Problem& problem) {
+bool Build::fits(const CameraState& held, const Problem& problem) const {
+  const CameraState own = cameras(problem);
+  return held.poses.size() == own.poses.size() && held.sets.size() == own.sets.size() &&
+         held.sensors.size() == own.sensors.size() && held.frames.size() == own.frames.size() &&
+         held.kept.size() == own.kept.size();
+}
+
+std::unique_ptr<Home> Build::make_home(const Problem& problem, const CameraState* held) {
   const Kernels& kernels = *kernels_;
+  CameraState start = held != nullptr ? *held : cameras(problem);
   if (by_image_)
-    return std::make_unique<ImageSystem>(cameras(problem), problem.image_camera,
+    return std::make_unique<ImageSystem>(std::move(start), problem.image_camera,
                                          std::move(*by_image_), arranged_->columns,
                                          watches_behind(), image_kernels(kernels.name), *threads_);
   const PointRules rules{options_.fixed.points, watches_behind(), options_.inner_iterations,
@@ -246,7 +254,7 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem) {
   }
   return std::make_unique<PointSystem>(
       std::move(rows),
-      PointSystem::Start{cameras(problem), std::move(camera_columns), &problem.points},
+      PointSystem::Start{std::move(start), std::move(camera_columns), &problem.points},
       PointSystem::Numbering{&arranged_->solved_columns(), &arranged_->solved_coarse_columns()},
       rules, choice_.plan, kernels, *threads_);
 }

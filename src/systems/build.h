@@ -40,8 +40,11 @@ class Build {
   /// Frees the problem's observations until `lent` goes, which must outlive neither of them.
   void lend(Problem& problem, std::optional<LentObservations>& lent) const;
 
-  /// The home, which the Build must outlive. Throws std::bad_alloc.
-  std::unique_ptr<Home> make_home(const Problem& problem);
+  /// The home, which the Build must outlive; its cameras are the problem's, or `held` as another
+  /// home had them. Throws std::bad_alloc.
+  std::unique_ptr<Home> make_home(const Problem& problem, const CameraState* held = nullptr);
+  /// Whether these are cameras of a home of this problem.
+  bool fits(const CameraState& held, const Problem& problem) const;
   /// Writes the home's held state into the problem.
   void store(const Home& home, Problem& problem) const;
 

@@ -98,9 +98,9 @@ CameraStage::History CameraStage::history() const {
   return out;
 }
 
-void CameraStage::restore(const History& history) {
-  solver_->restore(history.modes);
-  if (coarse_ && history.coarse) coarse_->restore(*history.coarse);
+bool CameraStage::restore(const History& history) {
+  if ((coarse_ != nullptr) != history.coarse.has_value()) return false;
+  return solver_->restore(history.modes) && (!coarse_ || coarse_->restore(*history.coarse));
 }
 
 double CameraStage::add_decrease(double sum) const {

@@ -45,8 +45,8 @@ class CameraStage {
     std::optional<CoarseSpace::History> coarse;
   };
   History history() const;
-  /// Of a stage of the same columns and solver.
-  void restore(const History& history);
+  /// Of a stage of the same columns and solver; false where it is of another.
+  bool restore(const History& history);
 
   // Sums over the columns that go on from what the points' parts came to.
 

@@ -27,7 +27,8 @@ class Home : public System {
   /// With it, the state and what the loop keeps
   /// (solve/trust_region.h), another home of the same problem and options goes on to the same bits.
   virtual HomeHistory history() const = 0;
-  virtual void restore(const HomeHistory& history) = 0;
+  /// False where it is of another home.
+  virtual bool restore(const HomeHistory& history) = 0;
   /// Observations behind their camera at the held state, or as many as there may be.
   virtual std::uint64_t count_behind() = 0;
   /// What it holds beside its arrangement.

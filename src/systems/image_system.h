@@ -32,7 +32,7 @@ class ImageSystem : public Home {
   void accept() override;
   double residual_scale(double quantile) override;
   HomeHistory history() const override { return {stage_.history()}; }
-  void restore(const HomeHistory& history) override { stage_.restore(history.stage); }
+  bool restore(const HomeHistory& history) override { return stage_.restore(history.stage); }
   const CameraState& cameras() const override { return held_.cameras; }
   void store_points(std::vector<double>&) const override {}
   std::uint64_t count_behind() override;

@@ -270,10 +270,13 @@ HomeHistory PointSystem::history() const {
   return {stage_.history(), {own.data(), own.data() + own.size()}};
 }
 
-void PointSystem::restore(const HomeHistory& history) {
-  stage_.restore(history.stage);
+bool PointSystem::restore(const HomeHistory& history) {
+  const std::size_t own = history.own_damping.size();
+  if (own != 0 && own != 8 * rows_->batches().groups.size()) return false;
+  if (!stage_.restore(history.stage)) return false;
   state_.own_damping.allocate(history.own_damping.size());
   std::copy(history.own_damping.begin(), history.own_damping.end(), state_.own_damping.data());
+  return true;
 }
 
 double PointSystem::residual_scale(double quantile) { return rows_->residual_scale(quantile); }

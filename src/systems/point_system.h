@@ -54,7 +54,7 @@ class PointSystem : public Home {
   void accept() override;
   double residual_scale(double quantile) override;
   HomeHistory history() const override;
-  void restore(const HomeHistory& history) override;
+  bool restore(const HomeHistory& history) override;
   const CameraState& cameras() const override { return state_.held.cameras; }
   void store_points(std::vector<double>& points) const override;
   std::uint64_t count_behind() override { return rows_->count_behind(); }

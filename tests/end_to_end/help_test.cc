@@ -112,10 +112,27 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--outliers", "--outlier-size", "--seed", "--protocol", "--normalize",
                     "--min-depth", "--sensor-rotation", "--sensor-translation"});
   if (verb == "solve")
-    options.insert({"--output", "--ply", "--max-iterations", "--tolerance", "--time-limit",
-                    "--loss", "--cheirality", "--points", "--fix", "--refine", "--solver",
-                    "--memory-limit", "--trust-region", "--initial-damping", "--inner-iterations",
-                    "--recoveries", "--simd", "--precision"});
+    options.insert({"--output",
+                    "--ply",
+                    "--max-iterations",
+                    "--tolerance",
+                    "--time-limit",
+                    "--loss",
+                    "--cheirality",
+                    "--points",
+                    "--fix",
+                    "--refine",
+                    "--solver",
+                    "--memory-limit",
+                    "--trust-region",
+                    "--initial-damping",
+                    "--inner-iterations",
+                    "--recoveries",
+                    "--simd",
+                    "--precision",
+                    "--checkpoint",
+                    "--checkpoint-every",
+                    "--resume"});
   return options;
 }
 

@@ -1,0 +1,50 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sheaf/error.h"
+#include "sheaf/solve.h"
+#include "solve/trust_region.h"
+#include "starts/sights.h"
+#include "systems/home.h"
+
+namespace sheaf {
+
+/// A run before one of its steps: with the same problem and options another process goes on from it
+/// to the bits of the run that was never stopped.
+struct Checkpoint {
+  std::string problem;                     ///< its fingerprint
+  std::vector<std::string> names, values;  ///< of options that steps depend on
+  Summary summary;
+  LoopHistory loop;
+  RunProgress progress;
+  HomeHistory home;
+  Estimate attempt_start;
+  // The state, to the bit: the home's cameras, and points as in a problem.
+  CameraState cameras;
+  std::vector<double> points;
+  // What a run changes of its own options.
+  int recoveries = 0;
+  CameraSolverKind solver = CameraSolverKind::automatic;
+  double initial_damping = 0;
+};
+
+/// Of all that steps depend on beside the options of the table: measurements, state, rigs, terms,
+/// what is held.
+std::string fingerprint(const Problem& problem, const Fixed& fixed);
+
+/// Names and values of the options that steps depend on, with the instruction set that is used.
+void put_options(const SolveOptions& options, const std::string& simd, Checkpoint& to);
+
+/// Written beside and renamed. Errors: unwritable_output.
+Result<void> write_checkpoint(const Checkpoint& checkpoint, const std::string& path);
+
+/// `expected` has the problem's fingerprint and the options. Errors: unreadable_input for what is
+/// no whole checkpoint of this version, usage, naming it, where problem or options are others.
+Result<Checkpoint> read_checkpoint(const std::string& path, const Checkpoint& expected,
+                                   const Problem& problem);
+
+}  // namespace sheaf
