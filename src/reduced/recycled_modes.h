@@ -28,7 +28,7 @@ class RecycledModes {
   /// The run has ended with this r.z: keeps what is worth keeping for the next.
   void end(double rz);
   /// Forgets all: the system was not what these modes take it for.
-  void clear() { kept_ = 0; }
+  void clear() { kept_ = next_ = 0; }
 
   /// z += sum_j (1 / theta_j - 1) y_j (y_j . r).
   void correct(const double* r, double* z) const;

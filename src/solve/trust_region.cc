@@ -108,7 +108,8 @@ class Loop {
 
  private:
   void tell_progress() {
-    if (hooks_ == nullptr || hooks_->progress == nullptr || !begun_) return;
+    if (hooks_ == nullptr || hooks_->progress == nullptr) return;
+    if (!begun_ && (history_ == nullptr || !*history_)) return;
     RunProgress& to = *hooks_->progress;
     to.rejected_in_a_row = rejected_in_a_row_;
     to.any_finite_trial = any_finite_trial_;

@@ -57,7 +57,7 @@ class Checkpoints : public testing::Test {
     Problem whole = start;
     const Summary expected = solve(whole, options);
     int stopped = 0;
-    for (int at = 1; at < static_cast<int>(expected.iterations.size()); at += 1 + at / 4) {
+    for (int at = 1; at < static_cast<int>(expected.iterations.size()); at += 1 + at / 2) {
       if (!stop_after(start, options, at)) continue;
       ++stopped;
       SCOPED_TRACE(at);
@@ -156,6 +156,11 @@ TEST_F(Checkpoints, SoDoStreetsWhosePointsHaveAnotherChart) {
     SolveOptions options;
     options.solver = solver;
     options.cheirality = Cheirality::hold_out;
+    expect_same_ends(street(), options);
+    // Floats find no positive definite matrix on the way, and what was recycled is forgotten.
+    options.loss = {LossKind::huber, kAutomaticScale};
+    options.tolerance = 1e-12;
+    options.max_iterations = 20;
     expect_same_ends(street(), options);
   }
 }
