@@ -79,12 +79,12 @@ struct SolveOptions {
   /// File that the run is written down in now and then, between two steps, so that another process
   /// can go on; empty: none. A checkpoint that cannot be written ends no solve
   /// (Summary::checkpoint_failure).
-  std::string checkpoint;
+  std::string checkpoint{};
   double checkpoint_every_s = 60;
   /// A checkpoint to go on from: the end is that of the run that was never stopped, bit for bit.
   /// Problem, options and instruction set must be those of that run, but for threads and the time
   /// limit, which counts from here on.
-  std::string resume;
+  std::string resume{};
 
   /// Called once the solver is chosen and before it allocates: solver, reason and forecast are set.
   /// Called again should another one go on (Summary::solver_changes).
