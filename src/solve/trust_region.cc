@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/cancel.h"
 #include "solve/step_control.h"
 
 namespace sheaf {
@@ -73,6 +74,18 @@ class Loop {
   }
 
   void run() {
+    try {
+      descend();
+    } catch (const Cancelled&) {
+      if (!begun_) throw;  // nothing is known of the state yet
+      out_of_time();
+    }
+    summary_.final_cost = cost_;
+    summary_.final_plain_cost = plain_cost_;
+  }
+
+ private:
+  void descend() {
     while (!done_) {
       loss_.floor = control_.curvature_floor();
       const Step step =
@@ -92,11 +105,8 @@ class Loop {
       else
         reject(tried, trial);
     }
-    summary_.final_cost = cost_;
-    summary_.final_plain_cost = plain_cost_;
   }
 
- private:
   /// The start: nothing tried yet. Later rounds go on from where the one before ended.
   void begin(const Step& step) {
     begun_ = true;
