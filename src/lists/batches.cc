@@ -8,6 +8,7 @@
 #include <bit>
 #include <utility>
 
+#include "platform/cancel.h"
 #include "platform/parallel.h"
 #include "scene/terms.h"
 
@@ -152,6 +153,7 @@ class RadixSort {
   std::uint64_t differing_bits() {
     std::atomic<std::uint64_t> differs{0};
     threads_.for_ranges(items_.size(), each_, [&](std::size_t i, std::size_t end) {
+      poll_cancelled();
       std::uint64_t bits = 0;
       for (; i < end; ++i) bits |= items_[i].key ^ items_[0].key;
       differs.fetch_or(bits, std::memory_order_relaxed);
@@ -162,6 +164,7 @@ class RadixSort {
   void pass(int shift) {
     const auto digit = [&](const KeyedPoint& item) { return (item.key >> shift) & (kDigits - 1); };
     threads_.for_ranges(items_.size(), each_, [&](std::size_t i, std::size_t end) {
+      poll_cancelled();
       std::array<std::uint32_t, kDigits>& count = counts_[i / each_];
       count.fill(0);
       for (; i < end; ++i) ++count[digit(items_[i])];
@@ -170,6 +173,7 @@ class RadixSort {
     for (std::size_t d = 0; d < kDigits; ++d)
       for (auto& count : counts_) sum += std::exchange(count[d], sum);
     threads_.for_ranges(items_.size(), each_, [&](std::size_t i, std::size_t end) {
+      poll_cancelled();
       std::array<std::uint32_t, kDigits>& to = counts_[i / each_];
       for (; i < end; ++i) other_[to[digit(items_[i])]++] = items_[i];
     });
@@ -199,6 +203,7 @@ Buffer<KeyedPoint> key_points(const Problem& p, const ByPoint& by_point, int len
   for (std::size_t part = 1; part < first.size(); ++part) first[part] += first[part - 1];
   Buffer<KeyedPoint> items(first.back());
   threads.for_ranges(p.num_points(), kPoints, [&](std::size_t j, std::size_t end) {
+    poll_cancelled();
     std::size_t at = first[j / kPoints];
     for (; j < end; ++j) {
       const std::uint64_t begin = by_point.first[j], track = by_point.track(j);
@@ -304,11 +309,13 @@ void fill_group(const Problem& p, const ByPoint& by_point, std::size_t g, Batche
 
 Batches arrange(const Problem& problem, const std::vector<std::uint8_t>& skip, Threads& threads) {
   const ByPoint by_point = list_by_point(problem, skip, threads);
+  poll_cancelled();
   Batches out;
   out.observations = by_point.first[problem.num_points()];
   form_groups(order_points(problem, by_point, threads), by_point, out, threads);
   if (!problem.observation_sigma.empty()) out.inverse_sigma.allocate(8 * out.num_batches());
   threads.for_ranges(out.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
+    poll_cancelled();
     for (; g < end; ++g) fill_group(problem, by_point, g, out);
   });
   fill_priors(problem, out);

@@ -8,6 +8,7 @@
 
 #include "lists/block_layout.h"
 #include "lists/slices.h"
+#include "platform/cancel.h"
 #include "platform/parallel.h"
 #include "platform/shared_word.h"
 
@@ -23,6 +24,7 @@ class TileNumbers {
     if (dense_) number_.assign(std::size_t(images_) * (images_ + 1) / 2, kNone);
     const std::size_t groups = batches.groups.size();
     threads.for_ranges(groups, dense_ ? kGroups : groups, [&](std::size_t g, std::size_t end) {
+      poll_cancelled();
       for_each_image_set(batches, g, end, [&](const std::vector<std::uint32_t>& set) {
         for (std::size_t i = 0; i < set.size(); ++i)
           for (std::size_t j = 0; j < i; ++j) mark(set[i], set[j]);
@@ -231,6 +233,7 @@ Buffer<Run> list_runs(std::vector<Chunk>& chunks, const std::vector<std::uint64_
   constexpr std::size_t kChunks = 8;
   std::vector<Buffer<Run>> parts((chunks.size() + kChunks - 1) / kChunks);
   threads.for_ranges(chunks.size(), kChunks, [&](std::size_t c, std::size_t last) {
+    poll_cancelled();
     Buffer<Run>& part = parts[c / kChunks];
     part.allocate(std::min<std::size_t>(items[last] - items[c], keys * (last - c)));
     for (Run* to = part.data(); c < last; ++c) {
@@ -247,6 +250,7 @@ Buffer<Run> list_runs(std::vector<Chunk>& chunks, const std::vector<std::uint64_
   }
   Buffer<Run> runs(sum);
   threads.for_ranges(chunks.size(), kChunks, [&](std::size_t c, std::size_t last) {
+    poll_cancelled();
     const std::size_t p = c / kChunks;
     std::copy_n(parts[p].data(), chunks[last - 1].*end, runs.data() + before[p]);
     for (; c < last; ++c) chunks[c].*first += before[p], chunks[c].*end += before[p];

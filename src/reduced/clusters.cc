@@ -7,6 +7,7 @@
 #include <queue>
 #include <utility>
 
+#include "platform/cancel.h"
 #include "platform/shared_word.h"
 
 namespace sheaf {
@@ -202,6 +203,7 @@ std::vector<std::int32_t> number_cluster_pairs(const Batches& batches, const Clu
   };
   const std::size_t looked_at = (batches.groups.size() + stride - 1) / stride;
   threads.for_ranges(looked_at, kGroups, [&](std::size_t first, std::size_t end) {
+    poll_cancelled();
     std::vector<std::int32_t> touched;
     for (std::size_t g = first * stride; g < std::min(batches.groups.size(), end * stride);
          g += stride)

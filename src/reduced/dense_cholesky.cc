@@ -7,6 +7,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "platform/cancel.h"
 #include "platform/dispatch.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -213,6 +214,7 @@ DenseCholesky::DenseCholesky(std::size_t n, const char* simd_name)
 void DenseCholesky::clear(Threads& threads) {
   const std::size_t columns = std::max<std::size_t>(1, 65536 / (lda_ + 1));
   threads.for_each((n_ + columns - 1) / columns, [&](std::size_t b) {
+    poll_cancelled();
     const std::size_t first = b * columns, end = std::min(n_, first + columns);
     std::memset(&A_[first * lda_], 0, (end - first) * lda_ * sizeof(double));
   });
@@ -258,6 +260,7 @@ bool DenseCholesky::factor(Threads& threads, const std::function<bool()>* cancel
     if (!factor_diagonal(k, width)) return false;
     if (below >= n_) break;
     each((rows - below + kRows - 1) / kRows, [&](std::size_t b) {
+      poll_cancelled();
       const std::size_t first = below + b * kRows;
       solve_below(k, width, first, std::min(rows, first + kRows));
     });
@@ -265,6 +268,7 @@ bool DenseCholesky::factor(Threads& threads, const std::function<bool()>* cancel
     const std::size_t blocks = (n_ - below + kColumns - 1) / kColumns;
     const std::size_t down = (rows - below + kRows - 1) / kRows;
     each(blocks * down, [&](std::size_t t) {
+      poll_cancelled();
       const std::size_t c = below + t / down * kColumns, c_end = std::min(n_, c + kColumns);
       const std::size_t first = below + t % down * kRows, end = std::min(rows, first + kRows);
       if (end > c) kernels_.update(A_.data(), lda_, k, width, first, end, c, c_end);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "platform/cancel.h"
 #include "reduced/camera_solver.h"
 #include "reduced/dense_cholesky.h"
 
@@ -20,8 +21,10 @@ class DenseSolver : public CameraSolver {
     for (std::size_t i = 0; i < columns_.num_images(); ++i)
       add_diagonal(system.sums.diagonal + kDiagonalDoubles * i, columns_.image(i));
     const std::vector<Tile>& tiles = system.sums.chunks->tiles;
-    for (std::size_t t = 0; t < tiles.size(); ++t)
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+      if (t % 1000 == 0) poll_cancelled();
       add_tile(system.sums.tiles + kTileDoubles * t, tiles[t]);
+    }
     for (std::size_t c = 0; c < cholesky_.size(); ++c) cholesky_.at(c, c) += system.damping[c];
     if (!cholesky_.factor(threads_, system.cancelled)) return {};
     std::copy(system.vectors->rhs.begin(), system.vectors->rhs.end(), x.begin());

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "options/solve_options.h"
+#include "platform/cancel.h"
 #include "platform/clock.h"
 #include "platform/memory.h"
 #include "scene/behind.h"
@@ -178,9 +179,45 @@ class Attempts {
   }
 
  private:
+  /// `refine`, or the end of it in the middle of a pass before anything is known of the system.
+  Result<void> attempt(bool first) {
+    const std::function<bool()> asked = [this] { return out_of_time(); };
+    try {
+      const CancelScope scope(asked);
+      return refine(first);
+    } catch (const Cancelled&) {
+      if (!summary_.iterations.empty()) put(reached_, problem_);
+      tell_cut_short();
+      return {};
+    }
+  }
+
+  /// The start is kept, or what an attempt before had reached.
+  void tell_cut_short() {
+    const bool stopped = options_.stop.stop_requested();
+    const std::string why = stopped ? "interrupted" : "the time limit was reached";
+    summary_.termination = stopped ? Termination::stopped : Termination::time_limit;
+    summary_.solve_s = clock_.seconds() - summary_.setup_s;
+    if (!summary_.iterations.empty()) {
+      summary_.words = why + "; the best state so far is kept";
+      return;
+    }
+    summary_.words = why + " before the first step; the start is kept";
+    summary_.rejected_observations.clear();
+    // Of what is known without a system: without a loss.
+    Iteration start;
+    start.cost = start.start_cost = start.trial_cost = evaluate(problem_).cost;
+    start.time_s = summary_.solve_s;
+    for (double* cost : {&summary_.initial_cost, &summary_.final_cost, &summary_.initial_plain_cost,
+                         &summary_.final_plain_cost})
+      *cost = start.cost;
+    summary_.iterations.push_back(start);
+    if (summary_.rounds.empty()) summary_.rounds.push_back({});
+  }
+
   /// Builds a system of the problem and refines it; stores it unless there is a better state to go
   /// on from. What went wrong, if anything.
-  Result<void> attempt(bool first) {
+  Result<void> refine(bool first) {
     Result<Build> planned = Build::plan(problem_, options_, skip_, kernels_, threads_);
     if (!planned.ok()) return planned.error();
     Build& build = planned.value();
@@ -332,7 +369,7 @@ class Attempts {
     options_.solver = solver_named(plan->kind);
     const Estimate start = estimate_of(problem_);
     build.store(home, problem_);
-    better_ = estimate_of(problem_);
+    better_ = reached_ = estimate_of(problem_);
     put(start, problem_);
     return true;
   }

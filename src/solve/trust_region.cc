@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/cancel.h"
 #include "solve/step_control.h"
 
 namespace sheaf {
@@ -82,6 +83,18 @@ class Loop {
   }
 
   void run() {
+    try {
+      descend();
+    } catch (const Cancelled&) {
+      if (!begun_) throw;  // nothing is known of the state yet
+      out_of_time();
+    }
+    summary_.final_cost = cost_;
+    summary_.final_plain_cost = plain_cost_;
+  }
+
+ private:
+  void descend() {
     while (!done_) {
       tell_progress();
       loss_.floor = control_.curvature_floor();
@@ -102,11 +115,8 @@ class Loop {
       else
         reject(tried, trial);
     }
-    summary_.final_cost = cost_;
-    summary_.final_plain_cost = plain_cost_;
   }
 
- private:
   void tell_progress() {
     if (hooks_ == nullptr || hooks_->progress == nullptr) return;
     if (!begun_ && (history_ == nullptr || !*history_)) return;

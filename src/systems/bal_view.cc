@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "geometry/camera_model.h"
+#include "platform/cancel.h"
 #include "platform/parallel.h"
 #include "scene/rigs.h"
 
@@ -90,6 +91,7 @@ void BalView::turn(const Problem& problem, Batches& batches, Threads& threads) c
   if (!turns_) return;
   constexpr std::size_t kBatches = 8192;
   threads.for_ranges(batches.num_batches(), kBatches, [&](std::size_t b, std::size_t end) {
+    poll_cancelled();
     for (; b < end; ++b)
       for (std::size_t l = 0; l < 8; ++l) {
         const std::uint32_t image = batches.image[8 * b + l];

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "eliminate/kernel_table.h"
+#include "platform/cancel.h"
 #include "platform/memory.h"
 #include "scene/rigs.h"
 #include "scene/terms.h"
@@ -157,6 +158,7 @@ Result<void> Build::plan_points(const Problem& problem, const std::vector<std::u
   const bool held = options_.fixed.points;
   Batches batches = arrange(problem, skipped(problem, skip, kept_), *threads_);
   view_->turn(problem, batches, *threads_);
+  poll_cancelled();
   arranged_ = std::make_unique<Arrangement>();
   arranged_->columns = columns;
   map_blocks_of(problem, skip);
@@ -232,6 +234,7 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem, const CameraState
   const PointRules rules{options_.fixed.points, watches_behind(), options_.inner_iterations,
                          chart_base(options_.points), points_.crosses};
   if (view_) cut_bal_lists(choice_.plan.kind, rules.held, *threads_, *arranged_);
+  poll_cancelled();
   const Columns& columns = arranged_->columns;
   CameraColumns camera_columns = view_ ? CameraColumns::of_bal(columns, problem.image_camera)
                                        : CameraColumns::of_lenses(columns, arranged_->tracks);

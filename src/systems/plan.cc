@@ -10,6 +10,7 @@
 
 #include "eliminate/kernels.h"
 #include "lists/slices.h"
+#include "platform/cancel.h"
 #include "platform/shared_word.h"
 #include "reduced/block_rows.h"
 #include "reduced/coarse_space.h"
@@ -27,6 +28,7 @@ std::uint64_t count_tiles(const Batches& batches, std::uint64_t images, std::vec
   const auto row_start = [](std::uint64_t row) { return row * (row + 1) / 2; };
   std::vector<std::uint64_t> marked((row_start(images) + 63) / 64, 0);
   threads.for_ranges(batches.groups.size(), kGroups, [&](std::size_t g, std::size_t end) {
+    poll_cancelled();
     for_each_image_set(batches, g, end, [&](const std::vector<std::uint32_t>& set) {
       for (std::size_t i = 0; i < set.size(); ++i)
         for (std::size_t j = 0; j < i; ++j) {

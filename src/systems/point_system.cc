@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "lists/slices.h"
+#include "platform/cancel.h"
 
 namespace sheaf {
 namespace {
@@ -149,6 +150,7 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
   CoarseSpace* const coarse = stage_.coarse();
   if (coarse != nullptr) coarse->begin(rows_->coarse_state(), request.damping);
   threads_.for_each(outputs.size(), [&](std::size_t s) {
+    poll_cancelled();
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(rows_->scratch());
     double* tiles = tiles_.data() + s * tile_doubles;
@@ -224,6 +226,7 @@ Trial PointSystem::try_step(const DoglegStep& step) {
   const Chunks& chunks = rows_->chunks();
   std::vector<TrialOutput> outputs(num_slices());
   threads_.for_each(outputs.size(), [&](std::size_t s) {
+    poll_cancelled();
     outputs[s] = {state_.tried.points.data(), 0, 0, 0, 0, 0, 0, state_.own_damping.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c)
       rows_->trial(in, c, outputs[s]);
