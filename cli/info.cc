@@ -12,6 +12,7 @@
 #include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
 #include "io/output_file.h"
+#include "io/rotation_norms.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
@@ -99,6 +100,16 @@ std::vector<std::uint32_t> stale_poses(const Problem& problem) {
   return problem.metadata ? problem.metadata->stale_poses : std::vector<std::uint32_t>();
 }
 
+// Rotations that other programs may take for what they are not; nothing where there are none.
+void print_norms(const Problem& problem) {
+  const OffNorms off = off_norms(problem);
+  if (off.images.empty()) return;
+  fmt::print(
+      "rotations   {} of {} stated by numbers off the length 1 by up to {:.2g}; normalised here, "
+      "while COLMAP takes them as they are\n",
+      off.images.size(), problem.num_images(), off.largest);
+}
+
 // "1 SIMPLE_RADIAL, 2 OPENCV"
 std::string lenses_text(const Problem& problem) {
   std::string out;
@@ -140,6 +151,14 @@ Json stale_json(const Problem& problem) {
   return {{"count", count}, {"first", stale}};
 }
 
+Json norms_json(const Problem& problem) {
+  constexpr std::size_t kMostListed = 1000;
+  OffNorms off = off_norms(problem);
+  const std::size_t count = off.images.size();
+  off.images.resize(std::min(count, kMostListed));
+  return {{"count", count}, {"first", off.images}, {"largest", number(off.largest)}};
+}
+
 void print(const std::string& path, const InputFile& input, const Statistics& statistics,
            const Evaluation& evaluation) {
   const Range& images = statistics.observations_per_image;
@@ -151,6 +170,7 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
   fmt::print("lenses      {}\n", lenses_text(input.problem));
   print_rigs(input.problem);
+  print_norms(input.problem);
   fmt::print("cost        {:.9e}\n", evaluation.cost);
   fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
              evaluation.rms_px, statistics.mean_error_px);
@@ -191,6 +211,7 @@ int run(const Arguments& arguments) {
   document["rigs"] = rigs_json(input.problem.rigs);
   document["rig_configuration"] = laid;
   document["stale_poses"] = stale_json(input.problem);
+  document["rotation_norms"] = norms_json(input.problem);
   document["cost"] = number(evaluation.cost);
   document["rms_px"] = number(evaluation.rms_px);
   document["mean_error_px"] = number(statistics.mean_error_px);

@@ -133,12 +133,10 @@ Result<void> write_folder(const Problem& problem, const fs::path& path, bool tex
   return write_colmap(files.value(), path);
 }
 
-/// BAL needs one of each; a file that could not be read back is not written.
+/// A file that could not be read back is not written.
 Result<void> write_bal_file(const Problem& given, const fs::path& path) {
-  if (given.num_images() == 0 || given.num_points() == 0 || given.num_observations() == 0)
-    return Error(ErrorCode::usage, path.string() +
-                                       ": a BAL file needs at least one camera, one point and one "
-                                       "observation");
+  if (given.num_images() == 0)
+    return Error(ErrorCode::usage, path.string() + ": a BAL file needs at least one camera");
   Problem turned;
   const Result<const Problem*> problem = with_bal_cameras(given, turned);
   if (!problem.ok()) return refused(path, problem.error());
@@ -240,8 +238,11 @@ Result<void> check_writable(const fs::path& path, bool model) {
   std::error_code ignored;
   if (fs::is_fifo(path, ignored)) return {};
   fs::path probe = path;
-  if (model && fs::is_directory(path, ignored)) probe = path / "cameras";
-  if (model && !path.empty() && !path.has_filename()) probe = path.parent_path();
+  if (model && fs::is_directory(path, ignored)) {
+    probe = path / "cameras";
+  } else if (model && !path.empty() && !path.has_filename()) {
+    probe = path.parent_path();
+  }
   Result<OutputFile> out = OutputFile::create(probe, Compression::none);
   if (!out.ok()) return out.error();
   return {};

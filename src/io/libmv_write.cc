@@ -72,9 +72,10 @@ struct Writer {
   void real(double value) { word(std::bit_cast<std::uint32_t>(static_cast<float>(value))); }
 };
 
-void put_image(const Problem& problem, std::size_t j, Writer& writer) {
+void put_image(const Problem& problem, std::size_t j, bool as_read, Writer& writer) {
   Matrix3<double> R = matrix_from_quaternion(problem.poses[j].rotation);
-  if (const double* stated = stated_numbers(problem, j, 9)) std::copy_n(stated, 9, R.begin());
+  if (const double* stated = as_read ? stated_numbers(problem, j, 9) : nullptr)
+    std::copy_n(stated, 9, R.begin());
   for (std::size_t column = 0; column < 3; ++column)
     for (std::size_t row = 0; row < 3; ++row) writer.real(R[3 * row + column]);
   for (const double t : problem.poses[j].translation) writer.real(t);
@@ -110,6 +111,7 @@ Result<std::string> format_libmv(const Problem& given) {
   const auto images = numbers_of(metadata.image_ids, problem.num_images());
   const auto tracks = numbers_of(metadata.point_ids, problem.num_points());
   const bool own = metadata.source && metadata.source->format == "libmv";
+  const bool as_read = is_as_read(given, "libmv");
 
   Writer writer;
   writer.out = {'v', own ? metadata.source->libmv_space : 'P'};
@@ -117,7 +119,7 @@ Result<std::string> format_libmv(const Problem& given) {
   writer.integer(problem.num_images());
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
     writer.integer(images[j]);
-    put_image(problem, j, writer);
+    put_image(problem, j, as_read, writer);
   }
   writer.integer(problem.num_points());
   for (std::size_t p = 0; p < problem.num_points(); ++p) {

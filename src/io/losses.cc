@@ -55,6 +55,19 @@ void add_rig_losses(bool colmap, const Problem& problem, Sentences& out) {
                   "image in a frame: of the rig that has their camera, or of one for each camera");
 }
 
+/// COLMAP reads a name in its text form up to the first blank; Sheaf reads on to the line's end.
+void add_cut_names(const Problem& problem, Sentences& out) {
+  if (problem.metadata == nullptr) return;
+  const std::vector<std::string>& names = problem.metadata->image_names;
+  const auto cut = std::count_if(names.begin(), names.end(), [](const std::string& name) {
+    return name.find_first_of(" \t") != name.npos;
+  });
+  if (cut > 0)
+    out.push_back(std::to_string(cut) +
+                  " image names have blanks, at which COLMAP cuts a name in its text form: its "
+                  "binary form (--format colmap) keeps them");
+}
+
 void add_term_losses(const Problem& problem, Sentences& out) {
   if (!problem.observation_sigma.empty()) out.push_back("sigmas of observations are not written");
   const Terms& terms = problem.terms;
@@ -75,6 +88,7 @@ Sentences lost_in(const std::string& format, const Problem& problem) {
   add_term_losses(problem, out);
   if (colmap && m && m->source && m->source->listed_images > problem.num_images())
     out.push_back("images that were never placed are not written");
+  if (format == "colmap-text") add_cut_names(problem, out);
   if (colmap) return out;
   if (format == "ply") {
     out.push_back("only points, colours and the cameras' places are written, in single precision");

@@ -26,6 +26,7 @@ struct Reader : PointText {
   bool matrices;  ///< R9T
   SourceFiles source;
 
+  std::optional<Error> image_name(const std::string& of, std::string_view& name);
   std::optional<Error> place(const std::string& of, Pose& pose);
   std::optional<Error> image(std::uint64_t i);
   std::optional<Error> view();
@@ -65,11 +66,28 @@ std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
   return in.refuse_as("found no rotation, or a centre too far away, expected the pose" + of);
 }
 
+/// Names may have blanks: a name is what stands before the numbers of its line. Where the numbers
+/// go on on further lines it is one word.
+std::optional<Error> Reader::image_name(const std::string& of, std::string_view& name) {
+  constexpr std::size_t kNumbers = 10, kNumbersOfMatrices = 15;
+  in.seek_field();
+  const std::string_view line = in.rest();
+  std::size_t end = line.size();
+  for (std::size_t k = 0; k < (matrices ? kNumbersOfMatrices : kNumbers) && end > 0; ++k) {
+    const std::size_t last = line.find_last_not_of(" \t", end - 1);
+    const std::size_t blank = last == line.npos ? line.npos : line.find_last_of(" \t", last);
+    end = blank == line.npos ? 0 : line.find_last_not_of(" \t", blank) + 1;
+  }
+  if (!in.read_word(name)) return in.refuse("the name" + of);
+  for (std::string_view word; name.size() < end && in.read_word(word);)
+    name = {name.data(), static_cast<std::size_t>(word.data() - name.data()) + word.size()};
+  return {};
+}
+
 std::optional<Error> Reader::image(std::uint64_t i) {
   const std::string of = " of image " + std::to_string(i);
   std::string_view name;
-  in.seek_field();
-  if (!in.read_word(name)) return in.refuse("the name" + of);
+  if (auto e = image_name(of, name)) return e;
   if (name.find('\r') != name.npos || name.find('\0') != name.npos)
     return in.refuse_as("found a zero byte or half a line's end, expected the name" + of);
   if (name.starts_with('#')) return in.refuse_as("found a comment, expected the name" + of);
@@ -112,6 +130,11 @@ void put(std::string& out, double value, char separator) {
 }
 void put(std::string& out, std::uint64_t value, char separator) {
   out.append(std::to_string(value)) += separator;
+}
+
+bool can_state(const std::string& name) {
+  return !name.empty() && name.find_first_of(std::string_view("\t\r\n\0", 4)) == name.npos &&
+         name.front() != '#' && name.front() != ' ' && name.back() != ' ';
 }
 
 /// As stated, where the pose is still the one it gives.
@@ -214,12 +237,12 @@ Result<std::string> format_nvm(const Problem& given) {
   const ColmapForm form = colmap_form(problem, "nvm");
   std::string out = "NVM_V3\n\n" + std::to_string(problem.num_images()) + "\n";
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
-    if (form.names[j].find_first_of(" \t\r\n") != std::string::npos || form.names[j].empty() ||
-        form.names[j].front() == '#')
-      return Error(ErrorCode::usage,
-                   "the image name '" + form.names[j] +
-                       "' has blanks, starts with # or is empty, which NVM cannot state");
-    out.append(form.names[j]) += ' ';
+    if (!can_state(form.names[j]))
+      return Error(ErrorCode::usage, "the image name " + sheaf::quoted(form.names[j]) +
+                                         " begins or ends with a blank, holds a tab, a zero byte "
+                                         "or a line's end, starts with # or is empty, which NVM "
+                                         "cannot state");
+    out.append(form.names[j]) += form.names[j].find(' ') == std::string::npos ? ' ' : '\t';
     put(out, problem.cameras[problem.image_camera[j]].parameters[0], ' ');
     for (std::size_t k = 0; k < 4; ++k) put(out, form.poses[j][k], ' ');
     for (const double c : centre_of(problem, j, source)) put(out, c, ' ');

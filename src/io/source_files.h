@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -39,5 +40,16 @@ struct SourceFiles {
   /// libmv: of the markers, 'P' (pixels) or 'N' (normalised).
   char libmv_space = 'P';
 };
+
+/// Whether a file of this format would say what was read of one: nothing changed since. Then what
+/// that file stated comes back as it stood, rotations that are no unit quaternions or orthonormal
+/// matrices included. Of any other state these would say something else to programs that take them
+/// as they are. The two forms of a COLMAP model are one format.
+inline bool is_as_read(const Problem& problem, std::string_view format) {
+  if (problem.metadata == nullptr || problem.metadata->source == nullptr) return false;
+  const std::string& read = problem.metadata->source->format;
+  const bool colmap = format.starts_with("colmap") && read.starts_with("colmap");
+  return (colmap || read == format) && state_hash(problem) == problem.metadata->state_hash;
+}
 
 }  // namespace sheaf

@@ -41,7 +41,13 @@ inline Pose pose_from_stated(const std::array<double, 7>& n) {
   return {rotation_from_stated(Quaternion<double>{n[0], n[1], n[2], n[3]}), {n[4], n[5], n[6]}};
 }
 
-/// The same of a row-major matrix that is a rotation as nearly as its digits allow; the quaternion
+/// Whether the numbers of a pose have a unit quaternion, to rounding: all programs take it alike.
+inline bool states_a_rotation(const std::array<double, 7>& n) {
+  const Quaternion<double> q{n[0], n[1], n[2], n[3]};
+  return same_bits(rotation_from_stated(q), q);
+}
+
+/// The rotation of a row-major matrix that is one as nearly as its digits allow; the quaternion
 /// is taken from the largest of its four squares.
 inline Quaternion<double> rotation_from_stated(const std::array<double, 9>& m) {
   const double x2 = 1 + m[0] - m[4] - m[8], y2 = 1 - m[0] + m[4] - m[8];
@@ -55,7 +61,8 @@ inline Quaternion<double> rotation_from_stated(const std::array<double, 9>& m) {
 }
 
 /// What the metadata have an image's rotation as (4 or 9 numbers), where the pose's quaternion is
-/// still the one that this converts to, bit for bit; else null.
+/// still the one that this converts to, bit for bit; else null. For files that come back as they
+/// were read, since to others it may say another rotation.
 inline const double* stated_numbers(const Problem& problem, std::size_t image, std::size_t count) {
   if (problem.metadata == nullptr) return nullptr;
   const std::vector<double>& all = problem.metadata->stated_rotations;
