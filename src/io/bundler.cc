@@ -12,8 +12,8 @@
 #include "io/colmap_parts.h"
 #include "io/line_cursor.h"
 #include "io/point_text.h"
-#include "io/source_files.h"
 #include "scene/camera_frame.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {

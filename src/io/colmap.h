@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/source_files.h"
+#include "scene/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/problem.h"
 

@@ -12,8 +12,8 @@
 #include "io/colmap_form.h"
 #include "io/line_cursor.h"
 #include "io/point_text.h"
-#include "io/source_files.h"
 #include "scene/camera_frame.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {
@@ -37,12 +37,6 @@ bool is_unit(const Quaternion<double>& q) {
   return std::abs(norm2 - 1) < 1e-6;
 }
 
-/// t = -R C
-std::array<double, 3> translation_of(const Quaternion<double>& q, const std::array<double, 3>& C) {
-  const Vector3<double> moved = multiply(matrix_from_quaternion(q), Vector3<double>(C));
-  return {-moved[0], -moved[1], -moved[2]};
-}
-
 std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
   if (matrices) {
     std::array<double, 9> R{};
@@ -58,7 +52,7 @@ std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
     metadata.stated_rotations.insert(metadata.stated_rotations.end(), q.begin(), q.end());
     if (auto e = reals(centre, "a coordinate of the centre" + of)) return e;
     pose.translation = translation_of(pose.rotation, centre);
-    source.nvm_centres.insert(source.nvm_centres.end(), centre.begin(), centre.end());
+    source.centres.insert(source.centres.end(), centre.begin(), centre.end());
   }
   const bool finite = std::all_of(pose.translation.begin(), pose.translation.end(),
                                   [](double t) { return std::isfinite(t); });
@@ -135,18 +129,6 @@ void put(std::string& out, std::uint64_t value, char separator) {
 bool can_state(const std::string& name) {
   return !name.empty() && name.find_first_of(std::string_view("\t\r\n\0", 4)) == name.npos &&
          name.front() != '#' && name.front() != ' ' && name.back() != ' ';
-}
-
-/// As stated, where the pose is still the one it gives.
-std::array<double, 3> centre_of(const Problem& problem, std::size_t j, const SourceFiles* source) {
-  const Pose& pose = problem.poses[j];
-  if (source && source->nvm_centres.size() == 3 * problem.num_images()) {
-    const double* c = &source->nvm_centres[3 * j];
-    const std::array<double, 3> stated{c[0], c[1], c[2]};
-    if (translation_of(pose.rotation, stated) == pose.translation) return stated;
-  }
-  const auto& [w, x, y, z] = pose.rotation;
-  return translation_of({w, -x, -y, -z}, pose.translation);
 }
 
 /// `measured`: what stands for the measurements, or null.
@@ -245,7 +227,8 @@ Result<std::string> format_nvm(const Problem& given) {
     out.append(form.names[j]) += form.names[j].find(' ') == std::string::npos ? ' ' : '\t';
     put(out, problem.cameras[problem.image_camera[j]].parameters[0], ' ');
     for (std::size_t k = 0; k < 4; ++k) put(out, form.poses[j][k], ' ');
-    for (const double c : centre_of(problem, j, source)) put(out, c, ' ');
+    for (const double c : centre_of(problem, j, source ? &source->centres : nullptr))
+      put(out, c, ' ');
     put(out, measured ? source->nvm_distortion[j] : 0, ' ');
     out += "0\n";
   }

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "io/colmap_rigs.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 
 namespace sheaf {
 namespace {

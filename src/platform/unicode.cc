@@ -23,4 +23,16 @@ std::string comparable_name(std::string_view name) {
   return std::string(reinterpret_cast<const char*>(composed), static_cast<std::size_t>(length));
 }
 
+bool is_utf8(std::string_view text) {
+  const auto* at = reinterpret_cast<const utf8proc_uint8_t*>(text.data());
+  for (auto left = static_cast<utf8proc_ssize_t>(text.size()); left > 0;) {
+    utf8proc_int32_t letter;
+    const utf8proc_ssize_t length = utf8proc_iterate(at, left, &letter);
+    if (length <= 0) return false;
+    at += length;
+    left -= length;
+  }
+  return true;
+}
+
 }  // namespace sheaf

@@ -12,6 +12,9 @@ namespace sheaf {
 /// the same. What is no UTF-8 is left as it stands.
 std::string comparable_name(std::string_view name);
 
+/// Whether a text is UTF-8, as JSON has to be.
+bool is_utf8(std::string_view text);
+
 /// The text behind a byte order mark (UTF-8's), which some editors put before a text.
 inline std::string_view without_mark(std::string_view text) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";

@@ -4,9 +4,11 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "sheaf/problem.h"
@@ -22,7 +24,26 @@ struct StatedPose {
 
 /// What only one format can hold, kept for writing the same format again.
 struct SourceFiles {
-  std::string format;  ///< "colmap", "colmap-text", "bundler", "nvm", "libmv"
+  std::string format;  ///< as `InputFile::format` has it
+
+  /// Of each camera those parameters that the file's own lens does not have, where its model has
+  /// more than that: they are held unless something else is asked for. Or empty.
+  std::vector<ParameterSet> unknown_parameters;
+  /// JSON formats: what lenses are called, of each observation its feature's scale, and members of
+  /// the file, of each image's object and of each lens's that problems have no place for.
+  std::vector<std::string> camera_names;
+  std::vector<double> feature_scales;
+  std::string root_members;
+  std::vector<std::string> image_members, camera_members;
+  /// OpenMVG, AliceVision: the images' ids of poses, and views that were never placed: their ids
+  /// and members.
+  std::vector<std::uint32_t> pose_ids;
+  std::vector<std::pair<std::uint32_t, std::string>> unplaced_views;
+  /// OpenSfM: measurements as they were, normalised by the larger side of the image, 2 for each
+  /// observation.
+  std::vector<double> normalised_xy;
+  /// A file beside that one which was read too, and is not to be overwritten; or empty.
+  std::filesystem::path beside{};
 
   /// COLMAP, text only: the files as they were, so that what was not changed is written as it
   /// stood, comments and number of digits included.
@@ -34,12 +55,24 @@ struct SourceFiles {
 
   /// Bundler: all images of the file's list, those that were never placed included.
   std::uint32_t listed_images = 0;
-  /// NVM: the radial coefficient of each image, with which its measurements were made straight,
-  /// these as they were (2 for each observation), and the images' centres.
-  std::vector<double> nvm_distortion, nvm_measured, nvm_centres;
+  /// NVM: the radial coefficient of each image, with which its measurements were made straight, and
+  /// these as they were (2 for each observation).
+  std::vector<double> nvm_distortion, nvm_measured;
+  /// Formats that state them: the images' centres (3 each).
+  std::vector<double> centres;
   /// libmv: of the markers, 'P' (pixels) or 'N' (normalised).
   char libmv_space = 'P';
 };
+
+/// What is held of a camera where nothing else is asked for: its principal point, and what the
+/// lens of its file does not have.
+inline ParameterSet usually_held(const Problem& problem, std::size_t camera) {
+  const ParameterSet centre = principal_point(problem.cameras[camera].model);
+  const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
+  if (source == nullptr || source->unknown_parameters.size() != problem.cameras.size())
+    return centre;
+  return static_cast<ParameterSet>(centre | source->unknown_parameters[camera]);
+}
 
 /// Whether a file of this format would say what was read of one: nothing changed since. Then what
 /// that file stated comes back as it stood, rotations that are no unit quaternions or orthonormal
