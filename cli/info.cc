@@ -159,6 +159,58 @@ Json norms_json(const Problem& problem) {
   return {{"count", count}, {"first", off.images}, {"largest", number(off.largest)}};
 }
 
+double mean_observations(const Problem& problem) {
+  if (problem.num_images() == 0) return 0;
+  return static_cast<double>(problem.num_observations()) /
+         static_cast<double>(problem.num_images());
+}
+
+std::uint32_t camera_id(const Problem& problem, std::size_t c) {
+  const bool known = problem.metadata && !problem.metadata->camera_ids.empty();
+  return known ? problem.metadata->camera_ids[c] : static_cast<std::uint32_t>(c);
+}
+
+// A line for each of the first lenses that images share.
+void print_cameras(const Problem& problem, const std::vector<CameraStatistics>& statistics) {
+  constexpr std::size_t kShown = 8;
+  if (problem.cameras.size() >= problem.num_images() && problem.cameras.size() > kShown) return;
+  for (std::size_t c = 0; c < std::min(problem.cameras.size(), kShown); ++c) {
+    const Camera& camera = problem.cameras[c];
+    std::vector<std::string> parameters;
+    const std::vector<std::string_view> names = parameter_names(camera.model);
+    for (std::size_t k = 0; k < names.size(); ++k)
+      parameters.push_back(fmt::format("{} {:.6g}", names[k], camera.parameters[k]));
+    fmt::print(
+        "camera {:<4} {}{}, {} images, mean error {:.6g} px: {}\n", camera_id(problem, c),
+        to_string(camera.model),
+        camera.width_px > 0 ? fmt::format(" {} x {}", camera.width_px, camera.height_px) : "",
+        statistics[c].images, statistics[c].mean_error_px, fmt::join(parameters, ", "));
+  }
+  if (problem.cameras.size() > kShown)
+    fmt::print("            and {} more\n", problem.cameras.size() - kShown);
+}
+
+// The first thousand.
+Json cameras_json(const Problem& problem, const std::vector<CameraStatistics>& statistics) {
+  constexpr std::size_t kMostListed = 1000;
+  Json out = Json::array();
+  for (std::size_t c = 0; c < std::min(problem.cameras.size(), kMostListed); ++c) {
+    const Camera& camera = problem.cameras[c];
+    std::vector<double> parameters(
+        camera.parameters.begin(),
+        camera.parameters.begin() + static_cast<std::ptrdiff_t>(parameter_count(camera.model)));
+    out.push_back({{"id", camera_id(problem, c)},
+                   {"model", to_string(camera.model)},
+                   {"width_px", camera.width_px},
+                   {"height_px", camera.height_px},
+                   {"parameters", parameters},
+                   {"images", statistics[c].images},
+                   {"observations", statistics[c].observations},
+                   {"mean_error_px", number(statistics[c].mean_error_px)}});
+  }
+  return out;
+}
+
 void print(const std::string& path, const InputFile& input, const Statistics& statistics,
            const Evaluation& evaluation) {
   const Range& images = statistics.observations_per_image;
@@ -168,21 +220,23 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   fmt::print("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
              input.read_s);
   for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
-  fmt::print("lenses      {}\n", lenses_text(input.problem));
-  print_rigs(input.problem);
-  print_norms(input.problem);
+  fmt::print("registered  {} images, mean {:.6g} observations ({:.0f} to {:.0f}, median {:.6g})\n",
+             input.problem.num_images(), mean_observations(input.problem), images.min, images.max,
+             images.median);
+  fmt::print("points      {}, mean track length {:.3f} ({:.0f} to {:.0f} observations)\n",
+             input.problem.num_points(), statistics.mean_track, statistics.track.min,
+             statistics.track.max);
+  fmt::print("error       mean reprojection error {:.6g} px, rms {:.6g} px\n",
+             statistics.mean_error_px, evaluation.rms_px);
   fmt::print("cost        {:.9e}\n", evaluation.cost);
-  fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
-             evaluation.rms_px, statistics.mean_error_px);
   fmt::print("behind      {} observations behind their camera\n", evaluation.behind.size());
   if (!evaluation.not_finite.empty())
     fmt::print("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
-  fmt::print("images      {:.0f} to {:.0f} observations, median {:.6g}\n", images.min, images.max,
-             images.median);
-  fmt::print("focal       {:.6g} to {:.6g} px, median {:.6g}\n", focal.min, focal.max,
-             focal.median);
-  fmt::print("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
-             statistics.track.min, statistics.track.max, statistics.mean_track);
+  fmt::print("lenses      {}; focal {:.6g} to {:.6g} px, median {:.6g}\n",
+             lenses_text(input.problem), focal.min, focal.max, focal.median);
+  print_cameras(input.problem, camera_statistics(input.problem));
+  print_rigs(input.problem);
+  print_norms(input.problem);
   fmt::print("memory      {} bytes for the problem, {} bytes at most for the process\n",
              size_bytes(input.problem), peak_resident_bytes());
   print_histogram(statistics);
@@ -205,6 +259,8 @@ int run(const Arguments& arguments) {
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION}, {"input", read}};
   document.update(statistics_json(statistics));
+  document["observations_per_image"]["mean"] = number(mean_observations(input.problem));
+  document["cameras"] = cameras_json(input.problem, camera_statistics(input.problem));
   document["lenses"] = Json::array();
   for (const auto& [model, count] : lenses_of(input.problem))
     document["lenses"].push_back({{"model", model}, {"count", count}});
