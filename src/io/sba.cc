@@ -86,7 +86,7 @@ class Reader {
 
   /// fu u0 v0 ar s, and where they are there k1 k2 p1 p2 k3.
   Wrong add_lens(LineCursor& in, const std::array<double, kLens + kDistortion>& n, bool distorted) {
-    if (!(n[0] > 0) || !(n[3] > 0))
+    if (!(n[0] > 0) || !(n[3] > 0) || !std::isfinite(n[0] * n[3]))
       return in.refuse_as("found no focal length or aspect ratio above 0, expected a lens");
     if (n[4] != 0)
       return in.refuse_as("found a skew of " + std::to_string(n[4]) +
