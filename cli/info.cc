@@ -11,6 +11,7 @@
 #include "image/png.h"
 #include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
+#include "io/rotation_norms.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
@@ -96,6 +97,16 @@ std::vector<std::uint32_t> stale_poses(const Problem& problem) {
   return problem.metadata ? problem.metadata->stale_poses : std::vector<std::uint32_t>();
 }
 
+// Rotations that other programs may take for what they are not; nothing where there are none.
+void print_norms(const Problem& problem) {
+  const OffNorms off = off_norms(problem);
+  if (off.images.empty()) return;
+  print_out(
+      "rotations   {} of {} stated by numbers off the length 1 by up to {:.2g}; normalised here, "
+      "while COLMAP takes them as they are\n",
+      off.images.size(), problem.num_images(), off.largest);
+}
+
 // "1 SIMPLE_RADIAL, 2 OPENCV"
 std::string lenses_text(const Problem& problem) {
   std::string out;
@@ -137,6 +148,66 @@ Json stale_json(const Problem& problem) {
   return {{"count", count}, {"first", stale}};
 }
 
+Json norms_json(const Problem& problem) {
+  constexpr std::size_t kMostListed = 1000;
+  OffNorms off = off_norms(problem);
+  const std::size_t count = off.images.size();
+  off.images.resize(std::min(count, kMostListed));
+  return {{"count", count}, {"first", off.images}, {"largest", number(off.largest)}};
+}
+
+double mean_observations(const Problem& problem) {
+  if (problem.num_images() == 0) return 0;
+  return static_cast<double>(problem.num_observations()) /
+         static_cast<double>(problem.num_images());
+}
+
+std::uint32_t camera_id(const Problem& problem, std::size_t c) {
+  const bool known = problem.metadata && !problem.metadata->camera_ids.empty();
+  return known ? problem.metadata->camera_ids[c] : static_cast<std::uint32_t>(c);
+}
+
+// A line for each of the first lenses that images share.
+void print_cameras(const Problem& problem, const std::vector<CameraStatistics>& statistics) {
+  constexpr std::size_t kShown = 8;
+  if (problem.cameras.size() >= problem.num_images() && problem.cameras.size() > kShown) return;
+  for (std::size_t c = 0; c < std::min(problem.cameras.size(), kShown); ++c) {
+    const Camera& camera = problem.cameras[c];
+    std::vector<std::string> parameters;
+    const std::vector<std::string_view> names = parameter_names(camera.model);
+    for (std::size_t k = 0; k < names.size(); ++k)
+      parameters.push_back(fmt::format("{} {:.6g}", names[k], camera.parameters[k]));
+    print_out(
+        "camera {:<4} {}{}, {} images, mean error {:.6g} px: {}\n", camera_id(problem, c),
+        to_string(camera.model),
+        camera.width_px > 0 ? fmt::format(" {} x {}", camera.width_px, camera.height_px) : "",
+        statistics[c].images, statistics[c].mean_error_px, fmt::join(parameters, ", "));
+  }
+  if (problem.cameras.size() > kShown)
+    print_out("            and {} more\n", problem.cameras.size() - kShown);
+}
+
+// The first thousand.
+Json cameras_json(const Problem& problem, const std::vector<CameraStatistics>& statistics) {
+  constexpr std::size_t kMostListed = 1000;
+  Json out = Json::array();
+  for (std::size_t c = 0; c < std::min(problem.cameras.size(), kMostListed); ++c) {
+    const Camera& camera = problem.cameras[c];
+    std::vector<double> parameters(
+        camera.parameters.begin(),
+        camera.parameters.begin() + static_cast<std::ptrdiff_t>(parameter_count(camera.model)));
+    out.push_back({{"id", camera_id(problem, c)},
+                   {"model", to_string(camera.model)},
+                   {"width_px", camera.width_px},
+                   {"height_px", camera.height_px},
+                   {"parameters", parameters},
+                   {"images", statistics[c].images},
+                   {"observations", statistics[c].observations},
+                   {"mean_error_px", number(statistics[c].mean_error_px)}});
+  }
+  return out;
+}
+
 void print(const std::string& path, const InputFile& input, const Statistics& statistics,
            const Evaluation& evaluation) {
   const Range& images = statistics.observations_per_image;
@@ -144,23 +215,27 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   const std::string packed = input.compression == "none" ? "" : ", " + input.compression;
   print_out("{}: {}\n", path, counts_text(input.problem));
   print_out("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
-            input.read_s);
+             input.read_s);
   for (const std::string& note : input.notes) print_out("note        {}\n", note);
-  print_out("lenses      {}\n", lenses_text(input.problem));
-  print_rigs(input.problem);
+  print_out("registered  {} images, mean {:.6g} observations ({:.0f} to {:.0f}, median {:.6g})\n",
+             input.problem.num_images(), mean_observations(input.problem), images.min, images.max,
+             images.median);
+  print_out("points      {}, mean track length {:.3f} ({:.0f} to {:.0f} observations)\n",
+             input.problem.num_points(), statistics.mean_track, statistics.track.min,
+             statistics.track.max);
+  print_out("error       mean reprojection error {:.6g} px, rms {:.6g} px\n",
+             statistics.mean_error_px, evaluation.rms_px);
   print_out("cost        {:.9e}\n", evaluation.cost);
-  print_out("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n", evaluation.rms_px,
-            statistics.mean_error_px);
   print_out("behind      {} observations behind their camera\n", evaluation.behind.size());
   if (!evaluation.not_finite.empty())
     print_out("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
-  print_out("images      {:.0f} to {:.0f} observations, median {:.6g}\n", images.min, images.max,
-            images.median);
-  print_out("focal       {:.6g} to {:.6g} px, median {:.6g}\n", focal.min, focal.max, focal.median);
-  print_out("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
-            statistics.track.min, statistics.track.max, statistics.mean_track);
+  print_out("lenses      {}; focal {:.6g} to {:.6g} px, median {:.6g}\n",
+             lenses_text(input.problem), focal.min, focal.max, focal.median);
+  print_cameras(input.problem, camera_statistics(input.problem));
+  print_rigs(input.problem);
+  print_norms(input.problem);
   print_out("memory      {} bytes for the problem, {} bytes at most for the process\n",
-            size_bytes(input.problem), peak_resident_bytes());
+             size_bytes(input.problem), peak_resident_bytes());
   print_histogram(statistics);
 }
 
@@ -181,12 +256,15 @@ int run(const Arguments& arguments) {
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION}, {"input", read}};
   document.update(statistics_json(statistics));
+  document["observations_per_image"]["mean"] = number(mean_observations(input.problem));
+  document["cameras"] = cameras_json(input.problem, camera_statistics(input.problem));
   document["lenses"] = Json::array();
   for (const auto& [model, count] : lenses_of(input.problem))
     document["lenses"].push_back({{"model", model}, {"count", count}});
   document["rigs"] = rigs_json(input.problem.rigs);
   document["rig_configuration"] = laid;
   document["stale_poses"] = stale_json(input.problem);
+  document["rotation_norms"] = norms_json(input.problem);
   document["cost"] = number(evaluation.cost);
   document["rms_px"] = number(evaluation.rms_px);
   document["mean_error_px"] = number(statistics.mean_error_px);

@@ -38,11 +38,12 @@ OptionSpec ply_of_two_states() {
 }
 
 OptionSpec problem_in() {
-  return {.name = "IN",
-          .placeholder = "FILE",
-          .help =
-              "problem: a BAL, Bundler, NVM or libmv file, plain or .gz or .bz2, or the folder "
-              "of a COLMAP model (told by content)"};
+  return {
+      .name = "IN",
+      .placeholder = "FILE",
+      .help =
+          "problem: a BAL, Bundler, NVM, libmv, OpenSfM, OpenMVG, AliceVision or g2o file, plain "
+          "or .gz or .bz2, or the folder of a COLMAP model (told by content)"};
 }
 
 OptionSpec problem_format() {
@@ -53,7 +54,8 @@ OptionSpec problem_format() {
 }
 
 std::vector<OptionChoice> problem_formats() {
-  return {{"bal"}, {"colmap", "binary"}, {"colmap-text"}, {"bundler"}, {"nvm"}, {"libmv"}, {"ply"}};
+  return {{"bal"},     {"colmap", "binary"}, {"colmap-text"}, {"bundler"},    {"nvm"}, {"libmv"},
+          {"opensfm"}, {"openmvg"},          {"alicevision"}, {"nerfstudio"}, {"ply"}};
 }
 
 }  // namespace sheaf

@@ -1,8 +1,9 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Bundler, NVM and libmv, told by their content: any bytes are refused with a message, or are a
-// valid problem; what Sheaf writes of it reads back to the same.
+// Bundler, NVM, libmv, g2o, OpenSfM, OpenMVG and AliceVision, told by their content: any bytes are
+// refused with a message, or are a valid problem; what Sheaf writes of it reads back, of the first
+// three to the same. Behind a zero byte stands the file that lies beside a JSON one (tracks.csv).
 
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,9 @@
 #include <vector>
 
 #include "io/bundler.h"
+#include "io/format.h"
+#include "io/g2o.h"
+#include "io/json_lines.h"
 #include "io/libmv.h"
 #include "io/nvm.h"
 
@@ -25,17 +29,20 @@ void require(bool condition, const char* what) {
 using Reader = sheaf::Result<sheaf::Problem> (*)(std::string_view, const std::string&,
                                                  std::vector<std::string>&);
 
+void require_refusal(const sheaf::Error& error, const char* begins) {
+  const std::string message = error.what();
+  require(error.code() == sheaf::ErrorCode::unreadable_input, "code of the error");
+  require(message.rfind(begins, 0) == 0, "the message names the input");
+  require(message.find("found") != message.npos && message.find("expected") != message.npos,
+          "found and expected");
+}
+
 void check(Reader read, sheaf::Result<std::string> (*format)(const sheaf::Problem&),
            std::string_view bytes, bool exact) {
   std::vector<std::string> notes;
   const sheaf::Result<sheaf::Problem> problem = read(bytes, "input", notes);
   if (!problem.ok()) {
-    const std::string message = problem.error().what();
-    require(problem.error().code() == sheaf::ErrorCode::unreadable_input, "code of the error");
-    require(message.rfind("input:", 0) == 0, "the message names the input");
-    require(message.find("found") != message.npos && message.find("expected") != message.npos,
-            "found and expected");
-    return;
+    return require_refusal(problem.error(), "input:");
   }
   require(sheaf::validate(problem.value()).ok(), "what was read is valid");
   if (format == nullptr) return;
@@ -49,6 +56,36 @@ void check(Reader read, sheaf::Result<std::string> (*format)(const sheaf::Proble
   require(format(again.value()).value() == text.value(), "and is written the same");
 }
 
+using Parsed = sheaf::Result<sheaf::Problem>;
+
+Parsed parse(const sheaf::FileFormat& format, const std::string& text, const std::string& beside) {
+  std::vector<std::string> notes;
+  const sheaf::Result<sheaf::JsonValue> root = sheaf::parse_json(text, "input");
+  const sheaf::FolderFiles files{
+      "input", [&](const std::string&) { return !beside.empty(); },
+      [&](const std::string&) { return sheaf::Result<std::string>(beside); }};
+  return format.parse({text, "input", &root.value(), files, notes});
+}
+
+void check_json(const std::string& text, const std::string& beside) {
+  const sheaf::Result<sheaf::JsonValue> root = sheaf::parse_json(text, "input");
+  if (!root.ok()) return require_refusal(root.error(), "input:");
+  for (const sheaf::FileFormat& format : sheaf::file_formats()) {
+    if (format.is_json == nullptr || !format.is_json(root.value())) continue;
+    const Parsed problem = parse(format, text, beside);
+    if (!problem.ok()) return require_refusal(problem.error(), "input");
+    require(sheaf::validate(problem.value()).ok(), "what was read is valid");
+    const sheaf::Result<sheaf::FormatOutput> out = format.format(problem.value());
+    if (!out.ok()) return;  // a name or a lens that the format cannot state
+    const auto& files = out.value().beside;
+    const Parsed again = parse(format, out.value().text, files.empty() ? "" : files[0].bytes);
+    require(again.ok(), "what was written can be read");
+    require(again.value().num_observations() == problem.value().num_observations(),
+            "it has as many observations");
+    return;
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -58,6 +95,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // Matrices and translations are written as quaternions and centres, which rounds.
   if (bytes.starts_with(sheaf::kNvmMark))
     check(sheaf::parse_nvm, sheaf::format_nvm, bytes, !bytes.starts_with("NVM_V3_R9T"));
+  if (sheaf::is_g2o(bytes)) check(sheaf::parse_g2o, nullptr, bytes, true);
+  if (bytes.starts_with('{') || bytes.starts_with('[')) {
+    const std::size_t end = bytes.find('\0');
+    check_json(std::string(bytes.substr(0, end)),
+               end == bytes.npos ? "" : std::string(bytes.substr(end + 1)));
+  }
   if (sheaf::is_libmv(bytes)) check(sheaf::parse_libmv, nullptr, bytes, true);
   return 0;
 }

@@ -32,6 +32,9 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
   out += fmt::format("patches     {} of {} seen at the start, {} of these left at the end\n",
                      summary.patches_visible, summary.patches_total, summary.patches_left);
   out += fmt::format("cost        {:.9e} -> {:.9e}\n", s.initial_cost, s.final_cost);
+  if (s.loss != LossKind::none && !s.rounds.empty())
+    out += fmt::format("loss        {}, scale {:.4g} grey levels\n", to_string(s.loss),
+                       s.rounds.back().scale_px);
   out += fmt::format("rms         {:.5g} -> {:.5g} grey levels\n", summary.initial_rms_grey,
                      summary.final_rms_grey);
   out += fmt::format("median      {:.5g} -> {:.5g} grey levels\n", summary.initial_median_grey,

@@ -21,7 +21,9 @@ struct ReadOptions {
 /// What was read, and from what.
 struct InputFile {
   Problem problem;
-  std::string format;       ///< "bal", "colmap", "colmap-text", "bundler", "nvm" or "libmv"
+  /// "bal", "colmap", "colmap-text", "bundler", "nvm", "libmv", "opensfm", "openmvg",
+  /// "alicevision", "g2o" or "sba".
+  std::string format;
   std::string compression;  ///< "none", "gzip" or "bzip2"
   std::string sha256;       ///< 64 hexadecimal digits, or empty when not asked for
   std::uint64_t bytes = 0;  ///< size on disk
@@ -30,22 +32,25 @@ struct InputFile {
   std::vector<std::string> notes;
 };
 
-/// Reads a problem: a file of BAL, Bundler, NVM or libmv, or the folder of a COLMAP model. Format
-/// and compression are sniffed from the content, never from the name; docs/formats.md describes
-/// them. The hash of a folder is that of its files one behind the other: cameras, images, points3D,
-/// rigs, frames. Errors: ErrorCode::unreadable_input with file, line (or byte), what was found,
-/// what was expected.
+/// Reads a problem: a file of BAL, Bundler, NVM, libmv, OpenSfM (with tracks.csv beside it),
+/// OpenMVG, AliceVision or g2o, or the folder of a COLMAP model or of SBA's files. Format and
+/// compression are sniffed from the content, never from the name; docs/formats.md describes them.
+/// The hash of a folder is that of its files one behind the other: cameras, images, points3D, rigs,
+/// frames. Errors: ErrorCode::unreadable_input with file, line (or byte), what was found, what was
+/// expected.
 Result<InputFile> read_file(const std::filesystem::path& path, const ReadOptions& options = {});
 Result<Problem> read(const std::filesystem::path& path);
 
 struct WriteOptions {
-  /// "bal", "colmap" (binary), "colmap-text", "bundler", "nvm", "libmv" or "ply"; empty: by the
-  /// name, as `write_format` tells.
+  /// "bal", "colmap" (binary), "colmap-text", "bundler", "nvm", "libmv", "opensfm", "openmvg",
+  /// "alicevision", "nerfstudio" or "ply"; empty: by the name, as `write_format` tells.
   std::string format;
 };
 
 /// The format that a problem is written in, by the path's name: `.ply` is a point cloud with camera
-/// frusta, `.out` Bundler, `.nvm` NVM, `.problem` libmv, all before a `.gz` or `.bz2`. A folder, a
+/// frusta, `.out` Bundler, `.nvm` NVM, `.problem` libmv, `.sfm` AliceVision, `reconstruction.json`
+/// OpenSfM, `sfm_data.json` OpenMVG, `transforms.json` nerfstudio, all before a `.gz` or `.bz2`;
+/// another `.json` is the JSON that was read, or "json", which `write` refuses. A folder, a
 /// name that ends in a slash and, for a problem that came from a COLMAP model, a name without
 /// extension, is a COLMAP model, in the form that was read. Anything else is BAL.
 std::string write_format(const Problem& problem, const std::filesystem::path& path);

@@ -272,7 +272,7 @@ Result<std::unique_ptr<InverseNormal>> InverseNormal::make(
                                SparseCholesky::invert_bytes(analysis->symbolic);
   if (memory_limit_bytes > 0 && needed > memory_limit_bytes)
     return Error(ErrorCode::memory_limit, "the covariance would need " + megabytes(needed) +
-                                              ", the limit is " + megabytes(memory_limit_bytes));
+                                              ", the limit is " + as_given(memory_limit_bytes));
   SparseCholesky cholesky({analysis, &analysis->symbolic}, available_kernels().front()->name);
   if (!out->factor(cholesky, 0, threads)) {
     out->ridged_ = true;

@@ -14,7 +14,7 @@ namespace sheaf {
 /// held turns nothing. Errors: ErrorCode::unreadable_input with `name` in front.
 Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name);
 
-/// PNG or JPEG, told by the first bytes.
+/// PNG, JPEG or binary PGM, told by the first bytes.
 Result<Raster> decode_image(std::string_view bytes, const std::string& name);
 
 }  // namespace sheaf

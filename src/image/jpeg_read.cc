@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "image/jpeg.h"
+#include "image/pgm.h"
 #include "image/png.h"
 
 // After <cstdio>, whose types it takes without including it.
@@ -87,6 +88,7 @@ Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name) {
 
 Result<Raster> decode_image(std::string_view bytes, const std::string& name) {
   if (bytes.starts_with("\xff\xd8\xff")) return decode_jpeg(bytes, name);
+  if (bytes.starts_with(kPgmMark)) return decode_pgm(bytes, name);
   return decode_png(bytes, name);
 }
 

@@ -13,6 +13,7 @@
 #include "inspect/lens_reach.h"
 #include "inspect/rig_findings.h"
 #include "inspect/statistics.h"
+#include "io/rotation_norms.h"
 #include "scene/camera_plane.h"
 #include "scene/point_errors.h"
 #include "scene/rigs.h"
@@ -137,6 +138,16 @@ void check_stale_poses(const Problem& problem, FindingList& list) {
                "model anew (convert to the other form, or solve)");
 }
 
+void check_norms(const Problem& problem, FindingList& list) {
+  const OffNorms off = off_norms(problem);
+  list.add("rotation-norms", false, "images", off.images,
+           plural(off.images.size(), "image has a rotation", "images have rotations") +
+               " whose stated numbers are off the length 1 by up to " + shown(off.largest) +
+               "; they are normalised here, and programs that take them as they are, as COLMAP "
+               "does, find other residuals: write the model anew (solve, or convert to another "
+               "format)");
+}
+
 /// More unknowns than measurements, whatever their arrangement; the 7 of the gauge are free.
 void check_rank(const Problem& problem, FindingList& list) {
   std::uint64_t lenses = 0;
@@ -242,6 +253,7 @@ std::vector<Finding> check(const Problem& problem) {
   check_points(problem, list);
   check_rank(problem, list);
   check_stale_poses(problem, list);
+  check_norms(problem, list);
   check_duplicates(problem, list);
   const MeasuredReaches measured = measured_reaches(problem);
   Named named(problem.num_observations(), false);

@@ -3,6 +3,7 @@
 #include "inspect/statistics.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "scene/point_errors.h"
@@ -51,6 +52,23 @@ Statistics statistics_of(const Problem& problem) {
   for (const double error : mean_point_errors(problem))
     if (error >= 0) sum += error, ++known;
   if (known > 0) out.mean_error_px = sum / static_cast<double>(known);
+  return out;
+}
+
+std::vector<CameraStatistics> camera_statistics(const Problem& problem) {
+  std::vector<CameraStatistics> out(problem.cameras.size());
+  std::vector<std::uint64_t> finite(out.size(), 0);
+  for (const std::uint32_t camera : problem.image_camera) ++out[camera].images;
+  const std::vector<double> lengths = residual_lengths(problem);
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const std::uint32_t camera = problem.image_camera[problem.observation_image[i]];
+    ++out[camera].observations;
+    if (!std::isfinite(lengths[i])) continue;
+    out[camera].mean_error_px += lengths[i];
+    ++finite[camera];
+  }
+  for (std::size_t c = 0; c < out.size(); ++c)
+    if (finite[c] > 0) out[c].mean_error_px /= static_cast<double>(finite[c]);
   return out;
 }
 

@@ -28,6 +28,14 @@ struct Statistics {
 };
 Statistics statistics_of(const Problem& problem);
 
+/// What was taken through one lens.
+struct CameraStatistics {
+  std::uint64_t images = 0, observations = 0;
+  double mean_error_px = 0;  ///< mean |r| of the observations whose residual is finite
+};
+/// One for each lens.
+std::vector<CameraStatistics> camera_statistics(const Problem& problem);
+
 /// What of a problem is mounted together.
 struct RigCounts {
   std::uint64_t rigs = 0, frames = 0, sensors = 0;

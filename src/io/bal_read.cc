@@ -30,10 +30,11 @@ std::string numbered(const std::string& what, std::uint64_t i, const char* recor
   return what + " of " + record + " " + std::to_string(i) + " (of " + std::to_string(count) + ")";
 }
 
-std::optional<Error> read_count(TokenReader& in, const char* what, std::uint64_t most,
-                                std::uint64_t& count) {
-  if (in.read_integer(count) && count >= 1 && count <= most) return {};
-  return in.unexpected(std::string("the number of ") + what + " (1 to " + std::to_string(most) +
+std::optional<Error> read_count(TokenReader& in, const char* what, std::uint64_t least,
+                                std::uint64_t most, std::uint64_t& count) {
+  if (in.read_integer(count) && count >= least && count <= most) return {};
+  return in.unexpected(std::string("the number of ") + what + " (" + std::to_string(least) +
+                       " to " + std::to_string(most) +
                        "; a BAL file begins with its numbers of cameras, points, observations)");
 }
 
@@ -163,9 +164,10 @@ void reserve(Problem& problem, const Counts& counts, bool vouched) {
 Result<Problem> read_bal(ByteSource& source, std::size_t window_bytes) {
   TokenReader in(source, window_bytes);
   Counts counts;
-  if (auto e = read_count(in, "cameras", kMaxIndexed, counts.cameras)) return *e;
-  if (auto e = read_count(in, "points", kMaxIndexed, counts.points)) return *e;
-  if (auto e = read_count(in, "observations", kMaxCount, counts.observations)) return *e;
+  if (auto e = read_count(in, "cameras", 1, kMaxIndexed, counts.cameras)) return *e;
+  if (auto e = read_count(in, "points", 0, kMaxIndexed, counts.points)) return *e;
+  const std::uint64_t most = counts.points > 0 ? kMaxCount : 0;
+  if (auto e = read_count(in, "observations", 0, most, counts.observations)) return *e;
   if (auto e = check_size(source, in, counts)) return *e;
 
   Problem problem;

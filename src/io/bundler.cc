@@ -12,8 +12,8 @@
 #include "io/colmap_parts.h"
 #include "io/line_cursor.h"
 #include "io/point_text.h"
-#include "io/source_files.h"
 #include "scene/camera_frame.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {
@@ -86,11 +86,12 @@ class Text {
   std::string out_;
 };
 
-void put_image(const Problem& problem, std::size_t j, Text& out) {
+void put_image(const Problem& problem, std::size_t j, bool as_read, Text& out) {
   const auto& k = problem.cameras[problem.image_camera[j]].parameters;
   out.row(std::array<double, 3>{k[0], k[1], k[2]});
   Matrix3<double> R = matrix_from_quaternion(problem.poses[j].rotation);
-  if (const double* stated = stated_numbers(problem, j, 9)) std::copy_n(stated, 9, R.begin());
+  if (const double* stated = as_read ? stated_numbers(problem, j, 9) : nullptr)
+    std::copy_n(stated, 9, R.begin());
   for (std::size_t r = 0; r < 9; r += 3) out.row(std::array<double, 3>{R[r], R[r + 1], R[r + 2]});
   out.row(problem.poses[j].translation);
 }
@@ -143,6 +144,7 @@ Result<std::string> format_bundler(const Problem& given) {
   const SceneMetadata* metadata = problem.metadata.get();
   const bool listed = metadata && metadata->source && metadata->source->format == "bundler";
   const std::size_t images = listed ? metadata->source->listed_images : problem.num_images();
+  const bool as_read = is_as_read(given, "bundler");
   const auto number = [&](std::size_t j) { return listed ? metadata->image_ids[j] : j; };
 
   Text out;
@@ -151,7 +153,7 @@ Result<std::string> format_bundler(const Problem& given) {
   std::size_t next = 0;
   for (std::size_t i = 0; i < images; ++i) {
     if (next < problem.num_images() && number(next) == i) {
-      put_image(problem, next++, out);
+      put_image(problem, next++, as_read, out);
     } else {
       out.add("0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n");
     }

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "io/sha256.h"
+#include "platform/unicode.h"
 
 namespace sheaf {
 namespace {
@@ -120,7 +121,7 @@ Result<std::string_view> ByteSource::head() {
     std::string first(kHead, '\0');
     const Result<std::size_t> n = read(first.data(), kHead);
     if (!n.ok()) return n.error();
-    head_ = first.substr(0, n.value());
+    head_ = without_mark(std::string_view(first).substr(0, n.value()));
   }
   return std::string_view(head_);
 }

@@ -59,7 +59,8 @@ class ByteSource {
   /// Fills up to `capacity` bytes; fewer only at the end of the text.
   Result<std::size_t> read(char* to, std::size_t capacity);
 
-  /// The first bytes of the text, up to 64; `read` begins with them all the same.
+  /// The first bytes of the text, up to 64, behind a byte order mark, which is left out; `read`
+  /// begins with them all the same.
   Result<std::string_view> head();
 
   /// What is left of the text, as a whole; compressed text at most 64 times as large as the file.

@@ -4,10 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "io/bundler.h"
 #include "io/colmap.h"
-#include "io/libmv.h"
-#include "io/nvm.h"
+#include "io/format.h"
 #include "scene/camera_frame.h"
 #include "sheaf/io.h"
 
@@ -40,9 +38,8 @@ Result<void> as(const std::string& format, const Result<Written>& written) {
 
 Result<void> can_hold(const std::string& format, const Problem& problem) {
   const Problem given = without_points(problem);
-  if (format == "bundler") return as(format, format_bundler(given));
-  if (format == "nvm") return as(format, format_nvm(given));
-  if (format == "libmv") return as(format, format_libmv(given));
+  const FileFormat* known = format_named(format);
+  if (known != nullptr && known->format != nullptr) return as(format, known->format(given));
   if (format == "colmap-text") return as(format, format_colmap(given, true));
   if (format != "bal") return {};
   Problem turned;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "io/output_folder.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/problem.h"
 

@@ -11,7 +11,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "io/source_files.h"
+#include "scene/source_files.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {

@@ -14,13 +14,14 @@ namespace sheaf {
 struct ColmapForm {
   const Problem* problem = nullptr;  ///< without BAL cameras
   bool unchanged = false;            ///< since it was read
+  bool as_read = false;              ///< nor is the format another one
   std::vector<std::uint32_t> camera_ids, image_ids;
   std::vector<std::string> names;
   std::vector<std::uint64_t> point_ids;
   std::vector<std::array<std::uint8_t, 3>> colours;
   std::vector<double> errors_px;
   FeatureTable features;
-  /// qw qx qy qz tx ty tz of each image: as stated, where it has not moved since.
+  /// qw qx qy qz tx ty tz of each image: as stated, where that is the same rotation to all.
   std::vector<std::array<double, 7>> poses;
 };
 

@@ -54,10 +54,10 @@ Result<ColmapFiles> load_colmap(const fs::path& folder) {
                       "folder of a COLMAP model" +
                       hint);
   }
-  for (const auto& [stem, bytes] : {std::pair{"cameras", &files.cameras},
-                                    {"images", &files.images},
-                                    {"points3D", &files.points}})
-    if (auto e = load(files.name(stem), *bytes)) return *e;
+  if (auto e = load(files.name("cameras"), files.cameras)) return *e;
+  if (auto e = load(files.name("images"), files.images)) return *e;
+  // Of a model that has poses alone, COLMAP's own recipe makes an empty text of points.
+  if (auto e = load(files.name("points3D"), files.points, files.text)) return *e;
   const bool rigs = is_there(files.name("rigs")), frames = is_there(files.name("frames"));
   if (rigs != frames)
     return unreadable(files.name(rigs ? "rigs" : "frames") + ": found without " +

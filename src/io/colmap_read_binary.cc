@@ -7,8 +7,9 @@
 namespace sheaf {
 namespace {
 
-/// Least sizes of records: what a count promises is held against the bytes that are left.
-constexpr std::uint64_t kLeastCamera = 24 + 3 * 8;
+/// Least sizes of records: what a count promises is held against the bytes that are left. A camera
+/// of a model that is not known may have no parameter at all, and is to be named as such.
+constexpr std::uint64_t kLeastCamera = 24;
 constexpr std::uint64_t kLeastImage = 4 + 7 * 8 + 4 + 1 + 8;
 constexpr std::uint64_t kFeature = 24;
 constexpr std::uint64_t kLeastPoint = 8 + 3 * 8 + 3 + 8 + 8;

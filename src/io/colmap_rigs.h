@@ -10,7 +10,7 @@
 
 #include "io/colmap.h"
 #include "io/colmap_form.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 
 namespace sheaf {
 

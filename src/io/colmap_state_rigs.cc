@@ -20,9 +20,10 @@ struct RigNames {
   std::vector<std::uint32_t> rigs, frames, sensors;
 };
 
-/// The numbers of a pose: as they were stated, where it is still what these say.
-void restate_pose(const Pose& pose, std::array<double, 7>& stated) {
-  if (same_bits(pose_from_stated(stated), pose)) return;
+/// The numbers of a pose: as they were stated, where it is still what these say, to COLMAP too: it
+/// does not normalise. `as_read`: nothing at all has changed.
+void restate_pose(const Pose& pose, std::array<double, 7>& stated, bool as_read) {
+  if (same_bits(pose_from_stated(stated), pose) && (as_read || states_a_rotation(stated))) return;
   std::copy_n(pose.rotation.begin(), 4, stated.begin());
   std::copy_n(pose.translation.begin(), 3, stated.begin() + 4);
 }
@@ -86,6 +87,10 @@ class Stating {
 
  private:
   Error refuse(const std::string& what) const { return Error(ErrorCode::usage, what); }
+
+  void restate(const Pose& pose, std::array<double, 7>& stated) const {
+    restate_pose(pose, stated, form_.as_read);
+  }
 
   std::uint32_t camera_id(std::uint32_t image) const {
     return form_.camera_ids[form_.problem->image_camera[image]];
@@ -152,7 +157,7 @@ class Stating {
     if (at == rig.sensors.end()) at = rig.sensors.insert(at, RigSensor());
     at->id = *cameras_[s];
     if (rigs_.is_reference[s] == 0)
-      restate_pose(rigs_.sensor_from_rig[s], at->pose ? *at->pose : at->pose.emplace());
+      restate(rigs_.sensor_from_rig[s], at->pose ? *at->pose : at->pose.emplace());
   }
 
   /// Those of which the source knows nothing: the reference first.
@@ -166,7 +171,7 @@ class Stating {
           if (rigs_.is_reference[s] != reference || !cameras_[s]) continue;
           RigSensor& sensor = record.sensors.emplace_back();
           sensor.id = *cameras_[s];
-          if (reference == 0) restate_pose(rigs_.sensor_from_rig[s], sensor.pose.emplace());
+          if (reference == 0) restate(rigs_.sensor_from_rig[s], sensor.pose.emplace());
         }
       if (record.sensors.empty() || record.sensors[0].pose)
         return refuse("rig " + std::to_string(r) +
@@ -200,7 +205,7 @@ class Stating {
       const std::uint32_t f = at->second;
       stated_[f] = true;
       frame.rig = names_.rigs[rigs_.frame_rig[f]];
-      restate_pose(rigs_.rig_from_world[f], frame.pose);
+      restate(rigs_.rig_from_world[f], frame.pose);
       std::vector<FrameDatum> here;
       for (const std::uint32_t j : images_of_frame_[f]) here.push_back(datum_of(j));
       const auto find_in = [](std::vector<FrameDatum>& list, const FrameDatum& datum) {
@@ -226,7 +231,7 @@ class Stating {
     FrameRecord& frame = out_.frames.emplace_back();
     frame.id = names_.frames[f];
     frame.rig = names_.rigs[rigs_.frame_rig[f]];
-    restate_pose(rigs_.rig_from_world[f], frame.pose);
+    restate(rigs_.rig_from_world[f], frame.pose);
     for (const std::uint32_t j : images_of_frame_[f]) frame.data.push_back(datum_of(j));
   }
 
@@ -254,7 +259,7 @@ class Stating {
       FrameRecord& frame = out_.frames.emplace_back();
       frame.id = next_frame++;
       frame.rig = at->second.first;
-      restate_pose(frame_from_image(at->second.second, form_.problem->poses[j]), frame.pose);
+      restate(frame_from_image(at->second.second, form_.problem->poses[j]), frame.pose);
       frame.data.push_back(datum_of(j));
     }
   }

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "io/colmap_form.h"
 #include "io/colmap_rigs.h"
+#include "io/line_cursor.h"
 #include "io/output_folder.h"
 #include "scene/camera_frame.h"
 #include "scene/point_errors.h"
@@ -29,6 +31,34 @@ bool writable_in_text(const std::string& name) {
   const auto blank = [](char c) { return c == ' ' || c == '\t'; };
   return std::none_of(name.begin(), name.end(), bad) &&
          (name.empty() || (!blank(name.front()) && !blank(name.back())));
+}
+
+template <class Id>
+std::optional<Id> repeated(std::vector<Id> ids) {
+  std::sort(ids.begin(), ids.end());
+  const auto twice = std::adjacent_find(ids.begin(), ids.end());
+  return twice == ids.end() ? std::nullopt : std::optional(*twice);
+}
+
+/// What would be read back as something else, or not at all.
+Result<void> check_names(const ColmapForm& form, bool text) {
+  const auto twice = [](const char* of, std::uint64_t id) {
+    return Error(ErrorCode::usage, std::string("two ") + of + " have the id " + std::to_string(id) +
+                                       "; a COLMAP model has ids that differ");
+  };
+  if (const auto id = repeated(form.camera_ids)) return twice("cameras", *id);
+  if (const auto id = repeated(form.image_ids)) return twice("images", *id);
+  if (const auto id = repeated(form.point_ids)) return twice("points", *id);
+  for (const std::string& name : form.names) {
+    if (name.find('\0') != name.npos)
+      return Error(ErrorCode::usage, "the image name " + sheaf::quoted(name) +
+                                         " holds a zero byte, where a COLMAP model ends a name");
+    if (text && !writable_in_text(name))
+      return Error(ErrorCode::usage, "the image name " + sheaf::quoted(name) +
+                                         " begins or ends with a blank or holds a line's end, "
+                                         "which COLMAP's text form cannot state");
+  }
+  return {};
 }
 
 /// The text of what was read, line by line; anew without a source.
@@ -80,20 +110,22 @@ Result<void> add_rigs(const ColmapForm& form, const SourceFiles* source, ColmapF
 }
 
 /// Where an image's pose is what frame and sensor gave when they were read, it is what the file
-/// stated beside them; a stale one only in a model that comes back as it was.
+/// stated beside them; a stale one only in a model that comes back as it was. A quaternion of
+/// another length than 1 likewise, as COLMAP does not normalise it.
 std::array<double, 7> stated_pose(const Problem& problem, std::size_t image, std::uint32_t id,
-                                  bool as_it_was) {
+                                  bool as_it_was, bool as_read) {
   const Pose pose = pose_of(problem, image);
   const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
   if (source != nullptr) {
     const auto stated = source->stated_poses.find(id);
     if (stated != source->stated_poses.end() && same_bits(stated->second.placed, pose) &&
-        (as_it_was || !stated->second.stale))
+        (as_it_was || !stated->second.stale) &&
+        (as_read || states_a_rotation(stated->second.numbers)))
       return stated->second.numbers;
   }
   const auto& t = pose.translation;
   std::array<double, 4> q = pose.rotation;
-  if (same_bits(problem.poses[image], pose))
+  if (as_read && same_bits(problem.poses[image], pose))
     if (const double* numbers = stated_numbers(problem, image, 4))
       std::copy_n(numbers, 4, q.begin());
   return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
@@ -107,6 +139,7 @@ ColmapForm colmap_form(const Problem& problem, const std::string& format) {
   ColmapForm form;
   form.problem = &problem;
   form.unchanged = problem.metadata && state_hash(problem) == metadata.state_hash;
+  form.as_read = is_as_read(problem, format);
   form.camera_ids = ids_or_numbers(metadata.camera_ids, problem.cameras.size());
   form.image_ids = ids_or_numbers(metadata.image_ids, problem.num_images());
   form.point_ids = ids_or_numbers(metadata.point_ids, problem.num_points());
@@ -121,7 +154,7 @@ ColmapForm colmap_form(const Problem& problem, const std::string& format) {
                                                                        : mean_point_errors(problem);
   const bool as_it_was = form.unchanged && metadata.source && metadata.source->format == format;
   for (std::size_t j = 0; j < problem.num_images(); ++j)
-    form.poses.push_back(stated_pose(problem, j, form.image_ids[j], as_it_was));
+    form.poses.push_back(stated_pose(problem, j, form.image_ids[j], as_it_was, form.as_read));
   return form;
 }
 
@@ -129,11 +162,7 @@ Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
   Problem turned;
   const Problem* problem = without_bal_cameras(given, turned);
   const ColmapForm form = colmap_form(*problem, text ? "colmap-text" : "colmap");
-  for (const std::string& name : form.names)
-    if (text && !writable_in_text(name))
-      return Error(ErrorCode::usage, "the image name '" + name +
-                                         "' begins or ends with a blank or holds a line's end, "
-                                         "which COLMAP's text form cannot state");
+  if (Result<void> good = check_names(form, text); !good.ok()) return good.error();
   const SourceFiles* source = given.metadata ? given.metadata->source.get() : nullptr;
   ColmapFiles files;
   if (text) {
@@ -160,9 +189,9 @@ Result<void> put_colmap(const ColmapFiles& files, OutputFolder& out) {
     const std::string name = name_of(stem, files.text), other = name_of(stem, !files.text);
     if (out.had(other))
       return refuse("it holds " + other + ", which would be mixed up with what is written");
-    if (bytes->empty() && out.had(name))
+    if (bytes->empty() && bytes != &files.points && out.had(name))
       return refuse("it holds " + name + " of a model with rigs, which this one has not");
-    if (bytes->empty()) continue;
+    if (bytes->empty() && bytes != &files.points) continue;
     Result<OutputFile> file = out.create_file(name);
     if (!file.ok()) return file.error();
     file.value().write(*bytes);

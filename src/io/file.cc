@@ -3,20 +3,21 @@
 #include <chrono>
 #include <future>
 #include <new>
+#include <optional>
 
 #include "io/bal.h"
 #include "io/bal_sink.h"
-#include "io/bundler.h"
 #include "io/byte_source.h"
 #include "io/colmap.h"
-#include "io/libmv.h"
-#include "io/nvm.h"
+#include "io/format.h"
 #include "io/output_file.h"
 #include "io/output_folder.h"
 #include "io/ply.h"
+#include "io/sba.h"
 #include "io/sha256.h"
 #include "scene/camera_frame.h"
 #include "scene/rigs.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 #include "sheaf/io.h"
 
@@ -43,24 +44,40 @@ std::string hash_file(const fs::path& path) {
   }
 }
 
-/// By the first bytes; what nothing else claims is BAL, which has no mark.
-std::string sniff(std::string_view head) {
-  if (head.starts_with(kBundlerMark)) return "bundler";
-  if (head.starts_with(kNvmMark)) return "nvm";
-  if (is_libmv(head)) return "libmv";
-  return "bal";
+/// The format that a JSON text is of, told by what it holds.
+Result<const FileFormat*> json_format(const JsonValue& root, const std::string& name) {
+  for (const FileFormat& format : file_formats())
+    if (format.is_json != nullptr && format.is_json(root)) return &format;
+  const bool frames = root.find("frames") != nullptr;
+  return Error(ErrorCode::unreadable_input,
+               name + ":1: found JSON " +
+                   (frames ? "of frames, as nerfstudio trains by, without points or observations"
+                           : "of no format that is read") +
+                   ", expected a file of one of these: " + readable_formats());
 }
 
-Result<Problem> parse(ByteSource& source, InputFile& file) {
+Result<Problem> parse(ByteSource& source, const fs::path& path, InputFile& file) {
   const Result<std::string_view> head = source.head();
   if (!head.ok()) return head.error();
-  file.format = sniff(head.value());
-  if (file.format == "bal") return read_bal(source);
+  Result<const FileFormat*> format = sniff_format(head.value(), source.name());
+  if (!format.ok()) return format.error();
+  if (format.value() != nullptr && format.value()->parse == nullptr) {
+    file.format = format.value()->name;
+    return read_bal(source);
+  }
   const Result<std::string> text = source.read_rest();
   if (!text.ok()) return text.error();
-  if (file.format == "bundler") return parse_bundler(text.value(), source.name(), file.notes);
-  if (file.format == "nvm") return parse_nvm(text.value(), source.name(), file.notes);
-  return parse_libmv(text.value(), source.name(), file.notes);
+  std::optional<Result<JsonValue>> json;
+  if (format.value() == nullptr) {
+    json = parse_json(text.value(), source.name());
+    if (!json->ok()) return json->error();
+    format = json_format(json->value(), source.name());
+    if (!format.ok()) return format.error();
+  }
+  file.format = format.value()->name;
+  FolderFiles beside = files_in(path.has_parent_path() ? path.parent_path() : fs::path("."));
+  return format.value()->parse({text.value(), source.name(), json ? &json->value() : nullptr,
+                                std::move(beside), file.notes});
 }
 
 Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
@@ -74,7 +91,7 @@ Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
 
   Result<ByteSource> source = ByteSource::open(std::move(raw));
   if (!source.ok()) return source.error();
-  Result<Problem> problem = parse(source.value(), file);
+  Result<Problem> problem = parse(source.value(), path, file);
   if (!problem.ok()) return problem.error();
   file.problem = std::move(problem).value();
   file.compression = to_string(source.value().compression());
@@ -88,25 +105,51 @@ Result<InputFile> read_from(RawBytes raw, const fs::path& path, bool hash) {
   return file;
 }
 
-Result<InputFile> read_folder(const fs::path& path, bool hash) {
-  const auto start = std::chrono::steady_clock::now();
+std::string hash_of(std::initializer_list<const std::string*> parts) {
+  Sha256 of_all;
+  for (const std::string* part : parts) of_all.update(part->data(), part->size());
+  return of_all.hex_digest();
+}
+
+Result<void> read_colmap(const fs::path& path, bool hash, InputFile& file) {
   const Result<ColmapFiles> files = load_colmap(path);
   if (!files.ok()) return files.error();
   Result<Problem> problem = parse_colmap(files.value());
   if (!problem.ok()) return problem.error();
-  InputFile file;
+  const ColmapFiles& f = files.value();
   file.problem = std::move(problem).value();
-  file.format = files.value().text ? "colmap-text" : "colmap";
+  file.format = f.text ? "colmap-text" : "colmap";
+  file.bytes = f.bytes;
+  if (hash) file.sha256 = hash_of({&f.cameras, &f.images, &f.points, &f.rigs, &f.frames});
+  return {};
+}
+
+Result<void> read_sba(const SbaFiles& files, bool hash, InputFile& file) {
+  Result<Problem> problem = parse_sba(files, file.notes);
+  if (!problem.ok()) return problem.error();
+  file.problem = std::move(problem).value();
+  file.format = "sba";
+  const auto& [cameras, points, calib] = files;
+  file.bytes = cameras.text.size() + points.text.size() + calib.text.size();
+  if (hash) file.sha256 = hash_of({&cameras.text, &points.text, &calib.text});
+  return {};
+}
+
+/// A model of COLMAP, unless there is none and files of SBA are.
+Result<InputFile> read_folder(const fs::path& path, bool hash) {
+  const auto start = std::chrono::steady_clock::now();
+  InputFile file;
   file.compression = to_string(Compression::none);
-  file.bytes = files.value().bytes;
+  std::optional<SbaFiles> sba;
+  std::error_code ignored;
+  if (!fs::exists(path / "cameras.bin", ignored) && !fs::exists(path / "cameras.txt", ignored)) {
+    Result<std::optional<SbaFiles>> found = load_sba(path);
+    if (!found.ok()) return found.error();
+    sba = std::move(found).value();
+  }
+  const Result<void> done = sba ? read_sba(*sba, hash, file) : read_colmap(path, hash, file);
+  if (!done.ok()) return done.error();
   file.read_s = seconds_since(start);
-  if (!hash) return file;
-  Sha256 of_all;
-  for (const std::string* part :
-       {&files.value().cameras, &files.value().images, &files.value().points, &files.value().rigs,
-        &files.value().frames})
-    of_all.update(part->data(), part->size());
-  file.sha256 = of_all.hex_digest();
   return file;
 }
 
@@ -135,12 +178,10 @@ Result<void> write_folder(const Problem& problem, const fs::path& path, bool tex
   return out.value().commit();
 }
 
-/// BAL needs one of each; a file that could not be read back is not written.
+/// A file that could not be read back is not written.
 Result<void> write_bal_file(const Problem& given, const fs::path& path) {
-  if (given.num_images() == 0 || given.num_points() == 0 || given.num_observations() == 0)
-    return Error(ErrorCode::usage, path.string() +
-                                       ": a BAL file needs at least one camera, one point and one "
-                                       "observation");
+  if (given.num_images() == 0)
+    return Error(ErrorCode::usage, path.string() + ": a BAL file needs at least one camera");
   Problem turned;
   const Result<const Problem*> problem = with_bal_cameras(given, turned);
   if (!problem.ok()) return refused(path, problem.error());
@@ -149,12 +190,31 @@ Result<void> write_bal_file(const Problem& given, const fs::path& path) {
   return write_bal(*problem.value(), out.value());
 }
 
-Result<void> write_text(const Result<std::string>& text, const fs::path& path) {
-  if (!text.ok()) return refused(path, text.error());
-  Result<OutputFile> out = create_output(path);
-  if (!out.ok()) return out.error();
-  out.value().write(text.value());
-  return out.value().commit();
+Result<void> write_as(const FileFormat& format, const Problem& problem, const fs::path& path) {
+  const Result<FormatOutput> made = format.format(problem);
+  if (!made.ok()) return refused(path, made.error());
+  std::vector<OutputFile> files;
+  Result<OutputFile> main = create_output(path);
+  if (!main.ok()) return main.error();
+  files.push_back(std::move(main).value());
+  files.back().write(made.value().text);
+  const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
+  for (const FormatFile& beside : made.value().beside) {
+    const fs::path target = path.parent_path() / beside.name;
+    std::error_code ignored;
+    if (source != nullptr && fs::equivalent(source->beside, target, ignored) && !ignored)
+      return Error(ErrorCode::unwritable_output,
+                   target.string() +
+                       ": would be written too, and the problem was read from it: name a file in "
+                       "another folder");
+    Result<OutputFile> file = create_output(target);
+    if (!file.ok()) return file.error();
+    files.push_back(std::move(file).value());
+    files.back().write(beside.bytes);
+  }
+  for (OutputFile& file : files)
+    if (Result<void> done = file.commit(); !done.ok()) return done;
+  return {};
 }
 
 Result<void> write_ply_file(const Problem& problem, const fs::path& path) {
@@ -196,13 +256,15 @@ Result<Problem> read(const fs::path& path) {
 
 std::string write_format(const Problem& problem, const fs::path& path) {
   Compression compression;
-  const fs::path extension = strip_compression(path, compression).extension();
-  if (extension == ".ply") return "ply";
-  if (extension == ".out") return "bundler";
-  if (extension == ".nvm") return "nvm";
-  if (extension == ".problem") return "libmv";
+  const std::string name = strip_compression(path, compression).filename().string();
+  for (const FileFormat& format : file_formats())
+    if (!format.ending.empty() && name.ends_with(format.ending)) return std::string(format.name);
   const std::string read_as =
       problem.metadata && problem.metadata->source ? problem.metadata->source->format : "";
+  if (name.ends_with(".json")) {
+    const FileFormat* own = format_named(read_as);
+    return own != nullptr && own->is_json != nullptr ? read_as : "json";
+  }
   const bool from_colmap = read_as.starts_with("colmap");
   std::error_code ignored;
   const bool folder = !path.empty() && (!path.has_filename() || fs::is_directory(path, ignored));
@@ -219,16 +281,22 @@ Result<void> write(const Problem& given, const fs::path& path, const WriteOption
     if (format == "colmap" || format == "colmap-text")
       return write_folder(problem, path, format == "colmap-text");
     if (format == "bal") return write_bal_file(problem, path);
-    if (format == "bundler") return write_text(format_bundler(problem), path);
-    if (format == "nvm") return write_text(format_nvm(problem), path);
-    if (format == "libmv") return write_text(format_libmv(problem), path);
     if (format == "ply") return write_ply_file(problem, path);
+    const FileFormat* known = format_named(format);
+    if (known != nullptr && known->format != nullptr) return write_as(*known, problem, path);
   } catch (const std::bad_alloc&) {
     return out_of_memory(path);
   }
-  return Error(
-      ErrorCode::usage,
-      "Sheaf writes bal, colmap, colmap-text, bundler, nvm, libmv and ply, not '" + format + "'");
+  if (format == "json")
+    return Error(ErrorCode::usage,
+                 path.string() +
+                     ": JSON may be OpenSfM's, OpenMVG's or nerfstudio's: name it "
+                     "reconstruction.json, sfm_data.json or transforms.json, or "
+                     "say which (convert --format)");
+  std::string names = "colmap, colmap-text, bal and ply";
+  for (const FileFormat& known : file_formats())
+    if (known.format != nullptr) names = std::string(known.name) + ", " + names;
+  return Error(ErrorCode::usage, "Sheaf writes " + names + ", not '" + format + "'");
 }
 
 Result<void> put_model(const Problem& given, bool text, OutputFolder& out) {

@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "io/byte_cursor.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {
@@ -85,12 +85,8 @@ std::optional<Error> Reader::cameras() {
     if (auto e = floats(pose.translation, "an entry of a translation")) return e;
     const std::array<double, 9> R{columns[0], columns[3], columns[6], columns[1], columns[4],
                                   columns[7], columns[2], columns[5], columns[8]};
-    for (std::size_t a = 0; a < 9; a += 3)
-      for (std::size_t b = 0; b < 9; b += 3) {
-        const double product = R[a] * R[b] + R[a + 1] * R[b + 1] + R[a + 2] * R[b + 2];
-        if (!(std::abs(product - (a == b)) < 1e-3))
-          return in.refuse_at(begin, "found rows that are not orthonormal, expected a rotation");
-      }
+    if (const char* found = no_rotation(R))
+      return in.refuse_at(begin, std::string("found ") + found + ", expected a rotation");
     if (!image_of.emplace(image, problem.num_images()).second)
       return in.refuse_at(begin, "found image " + std::to_string(image) +
                                      " a second time, expected numbers that differ");

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "platform/unicode.h"
+
 namespace sheaf {
 namespace {
 
@@ -34,6 +36,7 @@ bool LineCursor::next_line() {
   const std::size_t end = std::min(text_.find('\n', next_), text_.size());
   line_ = text_.substr(next_, end - next_);
   if (line_.ends_with('\r')) line_.remove_suffix(1);
+  if (number_ == 0) line_ = without_mark(line_);
   begin_ = next_;
   next_ = std::min(end + 1, text_.size());
   field_ = 0;

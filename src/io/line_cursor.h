@@ -11,7 +11,8 @@
 
 namespace sheaf {
 
-/// Walks over the lines of a text, and over the fields of a line, which blanks separate.
+/// Walks over the lines of a text, and over the fields of a line, which blanks separate. A byte
+/// order mark is no part of the first line.
 class LineCursor {
  public:
   LineCursor(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}

@@ -3,8 +3,9 @@
 #include <algorithm>
 
 #include "io/colmap_rigs.h"
-#include "io/source_files.h"
+#include "io/format.h"
 #include "scene/camera_frame.h"
+#include "scene/source_files.h"
 #include "sheaf/io.h"
 
 namespace sheaf {
@@ -25,12 +26,12 @@ std::size_t idle_features(const Problem& problem) {
   return problem.metadata->feature_begin.back() - problem.num_observations();
 }
 
-void add_lens_losses(const Problem& problem, Sentences& out) {
-  if (shares_lenses(problem))
+void add_lens_losses(const FormatHolds& holds, const Problem& problem, Sentences& out) {
+  if (!holds.shared_lenses && shares_lenses(problem))
     out.push_back("lenses that images share (" + std::to_string(problem.cameras.size()) + " for " +
                   std::to_string(problem.num_images()) + " images) are written for each image");
-  if (states_sizes(problem)) out.push_back("the size of the images is not written");
-  if (!has_only_bal_cameras(problem))
+  if (!holds.sizes && states_sizes(problem)) out.push_back("the size of the images is not written");
+  if (!holds.principal_points && !has_only_bal_cameras(problem))
     out.push_back("measurements count from the principal point, which is not written itself");
 }
 
@@ -55,6 +56,19 @@ void add_rig_losses(bool colmap, const Problem& problem, Sentences& out) {
                   "image in a frame: of the rig that has their camera, or of one for each camera");
 }
 
+/// COLMAP reads a name in its text form up to the first blank; Sheaf reads on to the line's end.
+void add_cut_names(const Problem& problem, Sentences& out) {
+  if (problem.metadata == nullptr) return;
+  const std::vector<std::string>& names = problem.metadata->image_names;
+  const auto cut = std::count_if(names.begin(), names.end(), [](const std::string& name) {
+    return name.find_first_of(" \t") != name.npos;
+  });
+  if (cut > 0)
+    out.push_back(std::to_string(cut) +
+                  " image names have blanks, at which COLMAP cuts a name in its text form: its "
+                  "binary form (--format colmap) keeps them");
+}
+
 void add_term_losses(const Problem& problem, Sentences& out) {
   if (!problem.observation_sigma.empty()) out.push_back("sigmas of observations are not written");
   const Terms& terms = problem.terms;
@@ -75,30 +89,29 @@ Sentences lost_in(const std::string& format, const Problem& problem) {
   add_term_losses(problem, out);
   if (colmap && m && m->source && m->source->listed_images > problem.num_images())
     out.push_back("images that were never placed are not written");
-  if (colmap) return out;
+  if (format == "colmap-text") add_cut_names(problem, out);
+  const FileFormat* known = format_named(format);
+  if (colmap || known == nullptr) return out;
+  const FormatHolds& holds = known->holds;
   if (format == "ply") {
     out.push_back("only points, colours and the cameras' places are written, in single precision");
     return out;
   }
-  if (format == "libmv") {
-    out.push_back("numbers are written in single precision");
-    if (states_sizes(problem)) out.push_back("the size of the images is not written");
-  } else {
-    add_lens_losses(problem, out);
-  }
+  if (!holds.observations)
+    out.push_back("observations are not written, and points in single precision");
+  if (!holds.doubles) out.push_back("numbers are written in single precision");
+  add_lens_losses(holds, problem, out);
   const std::size_t idle = idle_features(problem);
-  if (idle > 0)
+  if (idle > 0 && !holds.idle_features)
     out.push_back(std::to_string(idle) + " features that observe no point are not written");
-  const bool libmv = format == "libmv";
-  const bool names = m && !m->image_names.empty() && format != "nvm";
-  const bool ids = m && ((!m->point_ids.empty() && !libmv) || !m->camera_ids.empty());
-  const bool colours = m && !m->point_colours.empty() && (format == "bal" || libmv);
+  const bool ids = m && ((!m->point_ids.empty() && !holds.point_ids) ||
+                         (!m->camera_ids.empty() && !holds.camera_ids));
   const auto list = [&](bool there, const char* what) {
     if (there) out.push_back(std::string(what) + " not written");
   };
-  list(names, "image names are");
+  list(m && !m->image_names.empty() && !holds.names, "image names are");
   list(ids, "ids are");
-  list(colours, "colours are");
+  list(m && !m->point_colours.empty() && !holds.colours, "colours are");
   return out;
 }
 

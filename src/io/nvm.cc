@@ -12,8 +12,8 @@
 #include "io/colmap_form.h"
 #include "io/line_cursor.h"
 #include "io/point_text.h"
-#include "io/source_files.h"
 #include "scene/camera_frame.h"
+#include "scene/source_files.h"
 #include "scene/stated_rotation.h"
 
 namespace sheaf {
@@ -26,6 +26,7 @@ struct Reader : PointText {
   bool matrices;  ///< R9T
   SourceFiles source;
 
+  std::optional<Error> image_name(const std::string& of, std::string_view& name);
   std::optional<Error> place(const std::string& of, Pose& pose);
   std::optional<Error> image(std::uint64_t i);
   std::optional<Error> view();
@@ -34,12 +35,6 @@ struct Reader : PointText {
 bool is_unit(const Quaternion<double>& q) {
   const double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   return std::abs(norm2 - 1) < 1e-6;
-}
-
-/// t = -R C
-std::array<double, 3> translation_of(const Quaternion<double>& q, const std::array<double, 3>& C) {
-  const Vector3<double> moved = multiply(matrix_from_quaternion(q), Vector3<double>(C));
-  return {-moved[0], -moved[1], -moved[2]};
 }
 
 std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
@@ -57,7 +52,7 @@ std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
     metadata.stated_rotations.insert(metadata.stated_rotations.end(), q.begin(), q.end());
     if (auto e = reals(centre, "a coordinate of the centre" + of)) return e;
     pose.translation = translation_of(pose.rotation, centre);
-    source.nvm_centres.insert(source.nvm_centres.end(), centre.begin(), centre.end());
+    source.centres.insert(source.centres.end(), centre.begin(), centre.end());
   }
   const bool finite = std::all_of(pose.translation.begin(), pose.translation.end(),
                                   [](double t) { return std::isfinite(t); });
@@ -65,11 +60,28 @@ std::optional<Error> Reader::place(const std::string& of, Pose& pose) {
   return in.refuse_as("found no rotation, or a centre too far away, expected the pose" + of);
 }
 
+/// Names may have blanks: a name is what stands before the numbers of its line. Where the numbers
+/// go on on further lines it is one word.
+std::optional<Error> Reader::image_name(const std::string& of, std::string_view& name) {
+  constexpr std::size_t kNumbers = 10, kNumbersOfMatrices = 15;
+  in.seek_field();
+  const std::string_view line = in.rest();
+  std::size_t end = line.size();
+  for (std::size_t k = 0; k < (matrices ? kNumbersOfMatrices : kNumbers) && end > 0; ++k) {
+    const std::size_t last = line.find_last_not_of(" \t", end - 1);
+    const std::size_t blank = last == line.npos ? line.npos : line.find_last_of(" \t", last);
+    end = blank == line.npos ? 0 : line.find_last_not_of(" \t", blank) + 1;
+  }
+  if (!in.read_word(name)) return in.refuse("the name" + of);
+  for (std::string_view word; name.size() < end && in.read_word(word);)
+    name = {name.data(), static_cast<std::size_t>(word.data() - name.data()) + word.size()};
+  return {};
+}
+
 std::optional<Error> Reader::image(std::uint64_t i) {
   const std::string of = " of image " + std::to_string(i);
   std::string_view name;
-  in.seek_field();
-  if (!in.read_word(name)) return in.refuse("the name" + of);
+  if (auto e = image_name(of, name)) return e;
   if (name.find('\r') != name.npos || name.find('\0') != name.npos)
     return in.refuse_as("found a zero byte or half a line's end, expected the name" + of);
   if (name.starts_with('#')) return in.refuse_as("found a comment, expected the name" + of);
@@ -114,16 +126,9 @@ void put(std::string& out, std::uint64_t value, char separator) {
   out.append(std::to_string(value)) += separator;
 }
 
-/// As stated, where the pose is still the one it gives.
-std::array<double, 3> centre_of(const Problem& problem, std::size_t j, const SourceFiles* source) {
-  const Pose& pose = problem.poses[j];
-  if (source && source->nvm_centres.size() == 3 * problem.num_images()) {
-    const double* c = &source->nvm_centres[3 * j];
-    const std::array<double, 3> stated{c[0], c[1], c[2]};
-    if (translation_of(pose.rotation, stated) == pose.translation) return stated;
-  }
-  const auto& [w, x, y, z] = pose.rotation;
-  return translation_of({w, -x, -y, -z}, pose.translation);
+bool can_state(const std::string& name) {
+  return !name.empty() && name.find_first_of(std::string_view("\t\r\n\0", 4)) == name.npos &&
+         name.front() != '#' && name.front() != ' ' && name.back() != ' ';
 }
 
 /// `measured`: what stands for the measurements, or null.
@@ -214,15 +219,16 @@ Result<std::string> format_nvm(const Problem& given) {
   const ColmapForm form = colmap_form(problem, "nvm");
   std::string out = "NVM_V3\n\n" + std::to_string(problem.num_images()) + "\n";
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
-    if (form.names[j].find_first_of(" \t\r\n") != std::string::npos || form.names[j].empty() ||
-        form.names[j].front() == '#')
-      return Error(ErrorCode::usage,
-                   "the image name '" + form.names[j] +
-                       "' has blanks, starts with # or is empty, which NVM cannot state");
-    out.append(form.names[j]) += ' ';
+    if (!can_state(form.names[j]))
+      return Error(ErrorCode::usage, "the image name " + sheaf::quoted(form.names[j]) +
+                                         " begins or ends with a blank, holds a tab, a zero byte "
+                                         "or a line's end, starts with # or is empty, which NVM "
+                                         "cannot state");
+    out.append(form.names[j]) += form.names[j].find(' ') == std::string::npos ? ' ' : '\t';
     put(out, problem.cameras[problem.image_camera[j]].parameters[0], ' ');
     for (std::size_t k = 0; k < 4; ++k) put(out, form.poses[j][k], ' ');
-    for (const double c : centre_of(problem, j, source)) put(out, c, ' ');
+    for (const double c : centre_of(problem, j, source ? &source->centres : nullptr))
+      put(out, c, ' ');
     put(out, measured ? source->nvm_distortion[j] : 0, ' ');
     out += "0\n";
   }

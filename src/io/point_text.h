@@ -10,6 +10,7 @@
 
 #include "geometry/rotation.h"
 #include "io/line_cursor.h"
+#include "scene/stated_rotation.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -42,16 +43,9 @@ struct PointText {
   /// Refuses what is no rotation, as far as a file of few digits can state one.
   std::optional<Error> rotation(const std::array<double, 9>& R, std::uint64_t line,
                                 const std::string& of) const {
-    for (std::size_t a = 0; a < 9; a += 3)
-      for (std::size_t b = 0; b < 9; b += 3) {
-        const double product = R[a] * R[b] + R[a + 1] * R[b + 1] + R[a + 2] * R[b + 2];
-        if (!(std::abs(product - (a == b)) < 1e-3))
-          return in.refuse_at(line,
-                              "found rows that are not orthonormal, expected the rotation" + of);
-      }
-    const Vector3<double> third = cross<double>({R[0], R[1], R[2]}, {R[3], R[4], R[5]});
-    if (!(third[0] * R[6] + third[1] * R[7] + third[2] * R[8] > 0))
-      return in.refuse_at(line, "found a reflection, expected the rotation" + of);
+    const char* found = no_rotation(R);
+    if (found != nullptr)
+      return in.refuse_at(line, std::string("found ") + found + ", expected the rotation" + of);
     return {};
   }
 

@@ -13,6 +13,9 @@ namespace {
 
 Error unreadable(const std::string& message) { return Error(ErrorCode::unreadable_input, message); }
 
+/// What some cameras have where they saw nothing, as others have 0.
+constexpr std::uint16_t kNoDepth = 65535;
+
 /// An image, its depth map and its pose.
 struct Frame {
   double time = 0;
@@ -72,17 +75,23 @@ Result<std::vector<Frame>> frames_by_time(const FolderFiles& files, int every,
   return out;
 }
 
-/// color/N.png and depth/N.png, counted from 0 or 1, one for each line of pose.txt.
+/// NAME.png, or NAME.pgm where that is there.
+std::string picture(const FolderFiles& files, const std::string& name) {
+  return files.has(name + ".pgm") ? name + ".pgm" : name + ".png";
+}
+
+/// color/N.png and depth/N.png (or .pgm), counted from 0 or 1, one for each line of pose.txt.
 Result<std::vector<Frame>> frames_by_number(const FolderFiles& files, int every) {
   const Result<std::string> text = files.bytes("pose.txt");
   if (!text.ok()) return text.error();
   const auto poses = parse_trajectory(text.value(), files.name("pose.txt"), false);
   if (!poses.ok()) return poses.error();
-  const std::size_t first = files.has("color/0.png") ? 0 : 1;
+  const std::size_t first = files.has(picture(files, "color/0")) ? 0 : 1;
   std::vector<Frame> out;
   for (std::size_t i = 0; i < poses.value().size(); i += static_cast<std::size_t>(every)) {
-    const std::string file = std::to_string(first + i) + ".png";
-    out.push_back({poses.value()[i].time, "color/" + file, "depth/" + file, poses.value()[i].pose});
+    const std::string number = std::to_string(first + i);
+    out.push_back({poses.value()[i].time, picture(files, "color/" + number),
+                   picture(files, "depth/" + number), poses.value()[i].pose});
   }
   if (out.size() < 2)
     return unreadable(files.name("pose.txt") + ": found one image, expected 2 or more");
@@ -99,7 +108,8 @@ Result<DepthMap> depth_in_folder(const FolderFiles& files, const std::string& na
                       std::to_string(from.bits) + " bits, expected a depth map: 1 of 16 bits");
   DepthMap out{from.width, from.height, {}};
   out.depth.reserve(from.samples.size());
-  for (std::uint16_t sample : from.samples) out.depth.push_back(static_cast<float>(sample / scale));
+  for (const std::uint16_t sample : from.samples)
+    out.depth.push_back(sample == kNoDepth ? 0.0f : static_cast<float>(sample / scale));
   return out;
 }
 

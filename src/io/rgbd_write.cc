@@ -36,8 +36,8 @@ void put_hosts(const PhotometricProblem& problem, TextBuffer& text) {
 fs::path name_of(const PhotometricFolder& folder, const fs::path& file, std::size_t i) {
   const fs::path name = file.lexically_relative(folder.source);
   if (folder.format == "rgbd") return name;
-  const std::size_t first = folder.files[0].filename() == "0.png" ? 0 : 1;
-  return name.parent_path() / (std::to_string(first + i) + ".png");
+  const std::size_t first = folder.files[0].stem() == "0" ? 0 : 1;
+  return name.parent_path() / (std::to_string(first + i) + name.extension().string());
 }
 
 /// Copies of the files, and their list by time.

@@ -80,12 +80,11 @@ OptionField<PhotometricReadOptions> images_field() {
 Table depth_fields() {
   using O = PhotometricReadOptions;
   return {
-      F::real(
-          &O::depth_scale,
-          {.name = "depth-scale",
-           .placeholder = "N",
-           .range = between(1e-6, 1e9),
-           .help = "RGB-D: what a depth image has for one unit of the poses, 0 being no depth"}),
+      F::real(&O::depth_scale, {.name = "depth-scale",
+                                .placeholder = "N",
+                                .range = between(1e-6, 1e9),
+                                .help = "RGB-D: what a depth image has for one unit of the poses, "
+                                        "0 and 65535 being no depth"}),
       F::whole(&O::every, {.name = "every",
                            .placeholder = "N",
                            .range = from(1),

@@ -14,6 +14,7 @@
 #include "options/refinement_items.h"
 #include "options/words.h"
 #include "scene/rigs.h"
+#include "scene/source_files.h"
 
 namespace sheaf {
 namespace {
@@ -157,10 +158,9 @@ class Decisions {
 };
 
 Refinement by_default(const Problem& problem) {
-  RefinementItem centre, lens;
-  centre.part = Part::principal_point;
+  RefinementItem lens;
   lens.part = Part::lens;
-  const BitsOfModels centres = bits_of_models(centre), lenses = bits_of_models(lens);
+  const BitsOfModels lenses = bits_of_models(lens);
   Refinement out;
   out.poses.assign(problem.num_images(), true);
   out.named.assign(problem.num_images(), false);
@@ -168,7 +168,7 @@ Refinement by_default(const Problem& problem) {
     out.sensors.push_back(reference == 0);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const std::size_t m = model_number(problem, c);
-    out.lenses.push_back(static_cast<std::uint16_t>(lenses[m] & ~centres[m]));
+    out.lenses.push_back(static_cast<std::uint16_t>(lenses[m] & ~usually_held(problem, c)));
   }
   return out;
 }

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "options/words.h"
+#include "platform/unicode.h"
 #include "scene/rigs.h"
 
 namespace sheaf {
@@ -92,8 +93,11 @@ std::optional<std::uint32_t> index_of(const std::string& who, const std::vector<
   return static_cast<std::uint32_t>(found - ids.begin());
 }
 
-Named by_name(const std::string& who, const std::vector<std::string>& names) {
+Named by_name(const std::string& stated, const std::vector<std::string>& stated_names) {
   Named out;
+  const std::string who = comparable_name(stated);
+  std::vector<std::string> names;
+  for (const std::string& name : stated_names) names.push_back(comparable_name(name));
   for (std::uint32_t j = 0; j < names.size(); ++j)
     if (names[j] == who) out.indices.push_back(j);
   if (!out.indices.empty() || who.find_first_of("*?[") == std::string::npos) return out;

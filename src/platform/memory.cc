@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <string_view>
 
 namespace sheaf {
 
@@ -41,6 +42,13 @@ std::uint64_t peak_resident_bytes() {
 
 std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 999999) / 1000000) + " MB";
+}
+
+std::string as_given(std::uint64_t bytes) {
+  constexpr std::string_view kUnits = "KMGTPE";
+  std::size_t unit = 0;
+  for (; bytes > 0 && bytes % 1024 == 0 && unit < kUnits.size(); ++unit) bytes /= 1024;
+  return std::to_string(bytes) + (unit == 0 ? " bytes" : std::string(1, kUnits[unit - 1]));
 }
 
 }  // namespace sheaf

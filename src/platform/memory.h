@@ -14,4 +14,7 @@ std::uint64_t peak_resident_bytes();
 /// "12 MB", rounded up: for people.
 std::string megabytes(std::uint64_t bytes);
 
+/// A limit as a user gives it: "500M", "2G", "5000000 bytes".
+std::string as_given(std::uint64_t bytes);
+
 }  // namespace sheaf

@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <unordered_map>
 
+#include "platform/unicode.h"
+
 namespace sheaf {
 namespace {
 
@@ -175,6 +177,12 @@ Problem part_of(const Problem& problem, const Matching& matching, std::size_t Pa
   return out;
 }
 
+std::vector<std::string> comparable(const std::vector<std::string>& names) {
+  std::vector<std::string> out;
+  for (const std::string& name : names) out.push_back(comparable_name(name));
+  return out;
+}
+
 bool same_index(const std::vector<Pair>& pairs) {
   return std::all_of(pairs.begin(), pairs.end(),
                      [](const Pair& pair) { return pair.estimate == pair.reference; });
@@ -192,7 +200,7 @@ Result<Matching> match_models(const Problem& estimate, const Problem& reference)
   Result<void> matched;
   if (names != nullptr && their_names != nullptr) {
     out.by = Matching::By::names;
-    matched = match_images(*names, *their_names, "name", out);
+    matched = match_images(comparable(*names), comparable(*their_names), "name", out);
   } else if (names == nullptr && their_names == nullptr && ids != nullptr && their_ids != nullptr) {
     out.by = Matching::By::ids;
     matched = match_images(*ids, *their_ids, "id", out);

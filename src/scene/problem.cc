@@ -9,6 +9,7 @@
 #include "geometry/camera_model.h"
 #include "geometry/rotation.h"
 #include "scene/rigs.h"
+#include "scene/source_files.h"
 #include "scene/terms.h"
 
 namespace sheaf {
@@ -43,6 +44,12 @@ std::string numbered(const char* what, std::size_t i) {
   return std::string(what) + " " + std::to_string(i);
 }
 
+/// ": found 99, expected an image below 3"
+std::string beyond(const char* what, std::uint64_t index, std::size_t count) {
+  return ": found " + std::to_string(index) + ", expected " + what + " below " +
+         std::to_string(count);
+}
+
 Result<void> validate_sizes(const Problem& p) {
   if (p.image_camera.size() != p.poses.size())
     return invalid("image_camera has " + std::to_string(p.image_camera.size()) + " entries for " +
@@ -66,8 +73,8 @@ Result<void> validate_sizes(const Problem& p) {
 Result<void> validate_images(const Problem& p) {
   for (std::size_t i = 0; i < p.num_images(); ++i) {
     if (p.image_camera[i] >= p.cameras.size())
-      return invalid(numbered("image", i) + " names camera " + std::to_string(p.image_camera[i]) +
-                     " of " + std::to_string(p.cameras.size()));
+      return invalid(numbered("image", i) +
+                     beyond("a camera", p.image_camera[i], p.cameras.size()));
     double norm2 = 0;
     for (double q : p.poses[i].rotation) norm2 += q * q;
     if (!(std::abs(norm2 - 1) < 1e-6))
@@ -88,13 +95,11 @@ Result<void> validate_observations(const Problem& p) {
       return invalid(numbered("point", i / 3) + ": a coordinate is not finite");
   for (std::size_t i = 0; i < p.num_observations(); ++i) {
     if (p.observation_image[i] >= p.num_images())
-      return invalid(numbered("observation", i) + " names image " +
-                     std::to_string(p.observation_image[i]) + " of " +
-                     std::to_string(p.num_images()));
+      return invalid(numbered("observation", i) +
+                     beyond("an image", p.observation_image[i], p.num_images()));
     if (p.observation_point[i] >= p.num_points())
-      return invalid(numbered("observation", i) + " names point " +
-                     std::to_string(p.observation_point[i]) + " of " +
-                     std::to_string(p.num_points()));
+      return invalid(numbered("observation", i) +
+                     beyond("a point", p.observation_point[i], p.num_points()));
     if (!std::isfinite(p.observation_xy[2 * i]) || !std::isfinite(p.observation_xy[2 * i + 1]))
       return invalid(numbered("observation", i) + ": the pixel is not finite");
   }
@@ -204,7 +209,7 @@ std::vector<ParameterSet> held_parameters(const Problem& problem, const Fixed& f
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const CameraModel model = problem.cameras[c].model;
     const ParameterRoles& role = roles.emplace_back(roles_of(model));
-    ParameterSet set = fixed.parameters.empty() ? principal_point(model) : fixed.parameters[c];
+    ParameterSet set = fixed.parameters.empty() ? usually_held(problem, c) : fixed.parameters[c];
     if (fixed.f) set |= bit(role.fx) | bit(role.fy);
     if (fixed.k1) set |= bit(role.k1);
     if (fixed.k2) set |= bit(role.k2);

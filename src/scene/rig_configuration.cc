@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "geometry/rotation.h"
+#include "platform/unicode.h"
 #include "scene/rigs.h"
 
 namespace sheaf {
@@ -88,13 +89,17 @@ class Laying {
   /// what is left of their images' names.
   Result<void> sort_images() {
     Rigs& rigs = problem_.rigs;
-    const std::vector<std::string>& names = problem_.metadata->image_names;
+    std::vector<std::string> names, prefixes;
+    for (const std::string& name : problem_.metadata->image_names)
+      names.push_back(comparable_name(name));
+    for (const RigCamera* camera : cameras_)
+      prefixes.push_back(comparable_name(camera->image_prefix));
     rigs.image_frame.assign(names.size(), kNone);
     rigs.image_sensor = rigs.image_frame;
     std::map<std::pair<std::uint32_t, std::string>, std::vector<std::uint32_t>> frames;
     for (std::uint32_t j = 0; j < names.size(); ++j) {
       for (std::uint32_t s = 0; s < cameras_.size(); ++s) {
-        const std::string& prefix = cameras_[s]->image_prefix;
+        const std::string& prefix = prefixes[s];
         if (!names[j].starts_with(prefix)) continue;
         std::uint32_t& sensor = rigs.image_sensor[j];
         if (sensor != kNone)

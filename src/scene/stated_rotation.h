@@ -41,7 +41,13 @@ inline Pose pose_from_stated(const std::array<double, 7>& n) {
   return {rotation_from_stated(Quaternion<double>{n[0], n[1], n[2], n[3]}), {n[4], n[5], n[6]}};
 }
 
-/// The same of a row-major matrix that is a rotation as nearly as its digits allow; the quaternion
+/// Whether the numbers of a pose have a unit quaternion, to rounding: all programs take it alike.
+inline bool states_a_rotation(const std::array<double, 7>& n) {
+  const Quaternion<double> q{n[0], n[1], n[2], n[3]};
+  return same_bits(rotation_from_stated(q), q);
+}
+
+/// The rotation of a row-major matrix that is one as nearly as its digits allow; the quaternion
 /// is taken from the largest of its four squares.
 inline Quaternion<double> rotation_from_stated(const std::array<double, 9>& m) {
   const double x2 = 1 + m[0] - m[4] - m[8], y2 = 1 - m[0] + m[4] - m[8];
@@ -54,8 +60,41 @@ inline Quaternion<double> rotation_from_stated(const std::array<double, 9>& m) {
   return normalized(Quaternion<double>{c, e, f, z2});
 }
 
+/// What stands where a row-major matrix should be a rotation, as far as a file of few digits can
+/// state one; null where it is one.
+inline const char* no_rotation(const std::array<double, 9>& R) {
+  for (std::size_t a = 0; a < 9; a += 3)
+    for (std::size_t b = 0; b < 9; b += 3) {
+      const double product = R[a] * R[b] + R[a + 1] * R[b + 1] + R[a + 2] * R[b + 2];
+      if (!(std::abs(product - (a == b)) < 1e-3)) return "rows that are not orthonormal";
+    }
+  const Vector3<double> third = cross<double>({R[0], R[1], R[2]}, {R[3], R[4], R[5]});
+  return third[0] * R[6] + third[1] * R[7] + third[2] * R[8] > 0 ? nullptr : "a reflection";
+}
+
+/// t = -R C of a camera at C.
+inline std::array<double, 3> translation_of(const Quaternion<double>& q,
+                                            const std::array<double, 3>& C) {
+  const Vector3<double> moved = multiply(matrix_from_quaternion(q), Vector3<double>(C));
+  return {-moved[0], -moved[1], -moved[2]};
+}
+
+/// C = -R^T t; where `stated` (3 for each image) has one that gives the pose bit for bit, that.
+inline std::array<double, 3> centre_of(const Problem& problem, std::size_t image,
+                                       const std::vector<double>* stated) {
+  const Pose& pose = problem.poses[image];
+  if (stated != nullptr && stated->size() == 3 * problem.num_images()) {
+    std::array<double, 3> centre;
+    std::copy_n(&(*stated)[3 * image], 3, centre.begin());
+    if (translation_of(pose.rotation, centre) == pose.translation) return centre;
+  }
+  const auto& [w, x, y, z] = pose.rotation;
+  return translation_of({w, -x, -y, -z}, pose.translation);
+}
+
 /// What the metadata have an image's rotation as (4 or 9 numbers), where the pose's quaternion is
-/// still the one that this converts to, bit for bit; else null.
+/// still the one that this converts to, bit for bit; else null. For files that come back as they
+/// were read, since to others it may say another rotation.
 inline const double* stated_numbers(const Problem& problem, std::size_t image, std::size_t count) {
   if (problem.metadata == nullptr) return nullptr;
   const std::vector<double>& all = problem.metadata->stated_rotations;

@@ -44,7 +44,8 @@ std::optional<std::string> wrong_block(const Problem& problem, const GaussianPri
                             : block.kind == Kind::camera ? problem.cameras.size()
                                                          : problem.num_points();
   if (block.index >= count)
-    return "a block names entry " + std::to_string(block.index) + " of " + std::to_string(count);
+    return "a block names entry " + std::to_string(block.index) + ", expected one below " +
+           std::to_string(count);
   const std::size_t state = block.kind == Kind::pose ? 7 : columns_of(problem, block);
   if (block.state.size() != state || !finite(block.state))
     return "a block's state must be " + std::to_string(state) + " finite numbers";

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/json_reading.h"
 #include "survey/constraint_files.h"
-#include "survey/json_reading.h"
 
 namespace sheaf {
 namespace {

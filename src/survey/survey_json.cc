@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "geometry/rotation.h"
+#include "io/json_reading.h"
 #include "options/loss_option.h"
 #include "scene/terms.h"
 #include "survey/constraint_files.h"
-#include "survey/json_reading.h"
 
 namespace sheaf {
 namespace {

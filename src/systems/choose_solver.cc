@@ -71,7 +71,7 @@ std::shared_ptr<const WorkCounts> to_think_over(const WorkCounts& counts, Solver
 
 Error over_memory_limit(std::uint64_t needed, std::uint64_t limit, const std::string& more) {
   return Error(ErrorCode::memory_limit, "the solver would need " + megabytes(needed) +
-                                            ", over the limit of " + megabytes(limit) +
+                                            ", over the limit of " + as_given(limit) +
                                             "; nothing was allocated" + more);
 }
 
@@ -119,7 +119,7 @@ Result<Choice> choose_solver(const WorkCounts& counts, const SolveOptions& optio
       !counts.only_formed && lean <= options.memory_limit_bytes) {
     leanest.reason = std::string(to_string(choice.plan.kind)) + " would need " +
                      megabytes(choice.forecast_bytes) + ", over the limit of " +
-                     megabytes(options.memory_limit_bytes);
+                     as_given(options.memory_limit_bytes);
     choice.plan = leanest;
     choice.forecast_bytes = lean;
     return choice;

@@ -199,8 +199,12 @@ Plan plan_solver(const WorkCounts& c) {
                                     std::to_string(c.images)};
   const double dense = dense_seconds(c), sparse = sparse_seconds(c),
                explicit_cg = explicit_seconds(c), implicit_cg = implicit_seconds(c);
-  const std::string counts = std::to_string(c.images) + " images, " + std::to_string(c.tiles) +
-                             " blocks, " + std::to_string(c.pairs) + " pairs";
+  const std::uint64_t images = c.lenses ? c.lenses->images : c.images;
+  const std::uint64_t of_lenses = c.images - std::min(images, c.images);
+  const std::string counts =
+      std::to_string(images) + " images, " +
+      (of_lenses > 0 ? std::to_string(of_lenses) + " blocks of lenses, " : std::string()) +
+      std::to_string(c.tiles) + " blocks, " + std::to_string(c.pairs) + " pairs";
   const std::string costs =
       ": about " + milliseconds(dense) + " a step dense, " + milliseconds(sparse) + " sparse, " +
       milliseconds(explicit_cg) + " iterative explicit" +

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "end_to_end/command.h"
+#include "sheaf/sheaf.h"
 
 namespace sheaf {
 namespace {
@@ -220,13 +221,31 @@ TEST(ExitCode, UnwritableOutputIsSixAndKnownBeforeTheSolve) {
   EXPECT_EQ(run_command({"demo", "--json", "no/o"}, folder.path()).exit_code, 6);
 }
 
+TEST(ExitCode, NothingToSolveIsTwoWhateverTheFormat) {
+  TemporaryFolder folder;
+  Problem problem;
+  Camera camera{CameraModel::simple_pinhole, {800, 320, 240}};
+  camera.width_px = 640;
+  camera.height_px = 480;
+  problem.add_image({}, camera);
+  problem.add_image({{1, 0, 0, 0}, {1, 0, 0}}, 0);
+  for (const char* name : {"o.txt", "o.out", "o.nvm", "model/", "text/", "reconstruction.json",
+                           "sfm_data.json", "o.sfm"}) {
+    const std::string format = name == std::string("text/") ? "colmap-text" : "";
+    ASSERT_TRUE(write(problem, folder / name, {.format = format}).ok()) << name;
+    const Outcome solved = run_command({"solve", name}, folder.path());
+    EXPECT_EQ(solved.exit_code, 2) << name << ": " << solved.err;
+    EXPECT_NE(solved.err.find("observations"), std::string::npos) << name << ": " << solved.err;
+  }
+}
+
 TEST(ExitCode, OverTheMemoryLimitIsFiveAndNothingIsWritten) {
   TemporaryFolder folder;
   run_command({"generate", "in.txt", "--cameras", "40", "--points", "3000"}, folder.path());
   const Outcome refused =
       run_command({"solve", "in.txt", "-o", "o.txt", "--memory-limit", "1M"}, folder.path());
   EXPECT_EQ(refused.exit_code, 5);
-  EXPECT_NE(refused.err.find("over the limit"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("over the limit of 1M"), std::string::npos) << refused.err;
   EXPECT_EQ(folder.names(), Words{"in.txt"});
   EXPECT_EQ(run_command({"solve", "in.txt", "--memory-limit", "1G"}, folder.path()).exit_code, 0);
   run_command({"generate", "images", "--photometric", "--points", "100"}, folder.path());

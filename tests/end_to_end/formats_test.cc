@@ -42,6 +42,33 @@ TEST_F(FormatsCommand, ConvertsThereAndBack) {
   EXPECT_NEAR(evaluate(read(folder_ / "back.txt").value()).cost, cost, 1e-12 * cost);
 }
 
+TEST_F(FormatsCommand, InfoBeginsWithWhatOneLooksFor) {
+  ASSERT_EQ(run({"generate", "shared/", "--camera", "OPENCV", "--shared", "--points", "300",
+                 "--cameras", "8"})
+                .exit_code,
+            0);
+  const Outcome info = run({"info", "shared", "--json", "i.json"});
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  const auto json = json_of(folder_ / "i.json");
+  const double mean = json["observations_per_image"]["mean"];
+  EXPECT_DOUBLE_EQ(mean, json["input"]["observations"].get<double>() / 8);
+  ASSERT_EQ(json["cameras"].size(), 1u);
+  EXPECT_EQ(json["cameras"][0]["model"], "OPENCV");
+  EXPECT_EQ(json["cameras"][0]["images"], 8);
+  EXPECT_EQ(json["cameras"][0]["parameters"].size(), 8u);
+  EXPECT_EQ(json["cameras"][0]["observations"], json["input"]["observations"]);
+  std::size_t at = 0;
+  for (const char* line : {"registered  8 images, mean ", "points      300, mean track length ",
+                           "error       mean reprojection error ", "camera 1    OPENCV "}) {
+    const std::size_t found = info.out.find(line, at);
+    ASSERT_NE(found, std::string::npos) << line << " in\n" << info.out;
+    at = found;
+  }
+  // The lens is one block of the camera system beside the images.
+  const Outcome solved = run({"solve", "shared", "-o", "r/", "--max-iterations", "1"});
+  EXPECT_NE(solved.out.find("8 images, 1 blocks of lenses, "), std::string::npos) << solved.out;
+}
+
 TEST_F(FormatsCommand, SaysWhatAConversionDrops) {
   const Outcome kept = run({"convert", "model", "copy", "--json", "o.json"});
   EXPECT_EQ(kept.exit_code, 0);

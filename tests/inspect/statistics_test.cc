@@ -43,6 +43,24 @@ TEST(Statistics, CountsTracksImagesAndFocals) {
             3 * sizeof(Pose) + 3 * 4 + 2 * sizeof(Camera) + 12 * 8 + 5 * (4 + 4 + 16));
 }
 
+TEST(Statistics, OfEachLensAreThoseOfItsImages) {
+  Problem problem;
+  problem.add_image({}, {CameraModel::bal, {500, 0, 0}});
+  problem.add_image({}, {CameraModel::bal, {700, 0, 0}});
+  problem.add_image({}, 1);
+  problem.add_point(0, 0, -5);
+  problem.add_observation(0, 0, 3, 4);
+  problem.add_observation(1, 0, 0, 2);
+  problem.add_observation(2, 0, 4, 0);
+  const std::vector<CameraStatistics> cameras = camera_statistics(problem);
+  ASSERT_EQ(cameras.size(), 2u);
+  EXPECT_EQ(cameras[0].images, 1u);
+  EXPECT_EQ(cameras[1].images, 2u);
+  EXPECT_EQ(cameras[1].observations, 2u);
+  EXPECT_DOUBLE_EQ(cameras[0].mean_error_px, 5);
+  EXPECT_DOUBLE_EQ(cameras[1].mean_error_px, 3);
+}
+
 TEST(Statistics, AnEmptyProblemIsAllZero) {
   const Statistics statistics = statistics_of(Problem());
   EXPECT_TRUE(statistics.track_histogram.empty());

@@ -51,8 +51,8 @@ void expect_refused(const Broken& broken, ColmapFiles files) {
 
 TEST(ColmapMalformed, BinaryFilesAreRefusedWithTheirByte) {
   const Broken kinds[] = {
-      {"more cameras than bytes", [](auto& f) { put<std::uint64_t>(f.cameras, 0, 4); },
-       "m/cameras.bin: byte 0: found 4 cameras, expected at most the 3"},
+      {"more cameras than bytes", [](auto& f) { put<std::uint64_t>(f.cameras, 0, 7); },
+       "m/cameras.bin: byte 0: found 7 cameras, expected at most the 6"},
       {"absurd number of cameras", [](auto& f) { put<std::uint64_t>(f.cameras, 0, kNone); },
        "m/cameras.bin: byte 0: found 18446744073709551615 cameras"},
       {"unknown camera model", [](auto& f) { put<std::int32_t>(f.cameras, kModel, 99); },

@@ -114,6 +114,37 @@ TEST_F(Rgbd, NumberedFoldersSayTheSame) {
   EXPECT_EQ(folder.problem.sight_image, timed.sight_image);
 }
 
+/// As a PGM, and with 65535 where a camera saw nothing.
+TEST_F(Rgbd, DepthMapsMayBePgmAndHave65535WhereThereIsNoDepth) {
+  folder_ = numbered_folder(scene_, truth_);
+  const PhotometricFolder png = read().value();
+  const auto pgm_of = [](const Raster& raster, const std::string& comment) {
+    std::string out = "P5\n" + comment + std::to_string(raster.width) + " " +
+                      std::to_string(raster.height) + "\n65535\n";
+    for (const std::uint16_t sample : raster.samples) {
+      out += static_cast<char>(sample >> 8);
+      out += static_cast<char>(sample & 255);
+    }
+    return out;
+  };
+  for (const char* number : {"1", "2", "3", "4"}) {
+    const std::string name = std::string("depth/") + number;
+    const Raster raster = decode_png(folder_.at(name + ".png"), name).value();
+    folder_[name + ".pgm"] = pgm_of(raster, "# made by a test\n");
+    folder_.erase(name + ".png");
+  }
+  const PhotometricFolder pgm = read().value();
+  EXPECT_EQ(pgm.problem.points, png.problem.points);
+  EXPECT_EQ(pgm.depth_files[0].extension(), ".pgm");
+  const Raster nothing{160, 120, 1, 16, std::vector<std::uint16_t>(160 * 120, 65535)};
+  folder_["depth/1.pgm"] = pgm_of(nothing, "");
+  const PhotometricProblem without = read().value().problem;
+  EXPECT_EQ(std::count(without.host.begin(), without.host.end(), 0u), 0);
+  folder_["depth/1.pgm"].resize(1000);
+  EXPECT_NE(std::string(read().error().what()).find("byte 1000: found the end of the file"),
+            std::string::npos);
+}
+
 TEST_F(Rgbd, WhatIsBrokenIsSaid) {
   const MemoryFolder good = folder_;
   const auto refused = [&](const std::string& file, const std::string& bytes,

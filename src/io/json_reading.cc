@@ -1,6 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "survey/json_reading.h"
+#include "io/json_reading.h"
 
 #include <algorithm>
 #include <set>
