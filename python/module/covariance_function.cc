@@ -1,0 +1,156 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "covariance_document.h"
+#include "covariance_fields.h"
+#include "fork_safety.h"
+#include "keyword_options.h"
+#include "options/refinement.h"
+#include "options/shared_options.h"
+#include "sheaf/covariance.h"
+#include "survey_use.h"
+#include "verb.h"
+
+namespace sheaf {
+namespace {
+
+struct CovarianceArguments {
+  CovarianceOptions options;
+  RefinementArguments refinement;
+};
+
+std::vector<BoundOption> options_of(CovarianceArguments& a) {
+  return joined(
+      {bound(covariance_fields(), a.options),
+       bound(refinement_fields("what has no covariance"), a.refinement),
+       bound<CovarianceOptions>({SharedFields<CovarianceOptions>::threads()}, a.options)});
+}
+
+/// None: all; False: none; else indices.
+void choose_points(nb::handle points, CovarianceOptions& options) {
+  if (points.is_none()) return;
+  if (PyBool_Check(points.ptr())) {
+    options.points = nb::cast<bool>(points);
+    return;
+  }
+  options.point_ids = indices_from(points, "points");
+  options.points = !options.point_ids.empty();
+}
+
+/// Symmetric blocks of one size behind one another: (n, size, size).
+template <std::size_t kNumbers>
+nb::object blocks_of(const std::vector<std::array<double, kNumbers>>& blocks, std::size_t size) {
+  const double* data = blocks.empty() ? nullptr : blocks.front().data();
+  return array_of(data, {blocks.size(), size, size});
+}
+
+nb::list lenses_of(const Problem& problem, const Covariance& c) {
+  nb::list out;
+  for (std::size_t k = 0; k < c.lenses.size(); ++k) {
+    const std::size_t n = parameter_count(problem.cameras[k].model);
+    out.append(array_of(c.lenses[k], {n, n}));
+  }
+  return out;
+}
+
+nb::list weak_of(const Covariance& c) {
+  nb::list out;
+  for (const WeakDirection& weak : c.weak)
+    out.append(nb::module_::import_("sheaf._records")
+                   .attr("WeakDirection")(weak.words, weak.camera, nb::cast(weak.parameters),
+                                          weak.sigma, weak.correlation));
+  return out;
+}
+
+nb::object object_of(const Problem& problem, const Covariance& c) {
+  std::vector<double> redundancy, standardised;
+  for (const ObservationReliability& r : c.observations) {
+    redundancy.insert(redundancy.end(), r.redundancy.begin(), r.redundancy.end());
+    standardised.insert(standardised.end(), r.standardised.begin(), r.standardised.end());
+  }
+  nb::dict out;
+  out["gauge"] = to_string(c.gauge);
+  out["deficit"] = c.deficit;
+  out["freedoms"] = c.freedoms;
+  out["sigma"] = c.sigma;
+  out["sigma_estimated"] = c.sigma_estimated;
+  out["loss_factor"] = c.loss_factor;
+  out["rows"] = c.rows;
+  out["unknowns"] = c.unknowns;
+  out["redundancy"] = c.redundancy;
+  out["poses"] = blocks_of(c.poses, 6);
+  out["centres"] = blocks_of(c.centres, 3);
+  out["frames"] = blocks_of(c.frames, 6);
+  out["sensors"] = blocks_of(c.sensors, 6);
+  out["lenses"] = lenses_of(problem, c);
+  out["points"] = blocks_of(c.points, 3);
+  out["observation_redundancy"] = array_of(redundancy, {c.observations.size(), 2});
+  out["observation_standardised"] = array_of(standardised, {c.observations.size(), 2});
+  out["weak"] = weak_of(c);
+  out["words"] = c.words;
+  out["undetermined_points"] = c.undetermined_points;
+  out["seconds"] = c.seconds;
+  return nb::module_::import_("sheaf._records").attr("Covariance")(**out);
+}
+
+nb::object covariance_of(const ProblemHandle& held, const nb::kwargs& keywords) {
+  nb::dict left = nb::cast<nb::dict>(keywords.attr("copy")());
+  const std::optional<Constraints> constraints =
+      constraints_from(left.attr("pop")("constraints", nb::none()));
+  CovarianceArguments arguments;
+  choose_points(left.attr("pop")("points", nb::none()), arguments.options);
+  take_options(left, options_of(arguments));
+  check_all_taken(left, "covariance");
+
+  const ReadUse use(held);
+  CovarianceOptions& options = arguments.options;
+  options.threads = threads_here(options.threads);
+  if (arguments.refinement.given())
+    options.fixed =
+        fixed_of(refinement_of(arguments.refinement, use.problem()).value(), use.problem());
+  std::optional<Problem> placed;
+  std::optional<Covariance> found;
+  {
+    const nb::gil_scoped_release released;
+    validate(use.problem()).value();
+    if (constraints) {
+      placed = use.problem();
+      place_survey(*placed, *constraints, options.fixed).value();
+    }
+    found = covariance(placed ? *placed : use.problem(), options).value();
+    // Points of the survey are no points of the problem.
+    if (constraints && options.point_ids.empty() && options.points)
+      found->points.resize(use.problem().num_points());
+  }
+  return object_of(use.problem(), *found);
+}
+
+}  // namespace
+
+void bind_covariance(nb::module_& module) {
+  CovarianceArguments fresh;
+  const std::vector<BoundOption> options = options_of(fresh);
+  const std::string signature = signature_of("covariance", "problem: Problem",
+                                             {"points: bool | numpy.typing.ArrayLike | None = None",
+                                              "constraints: sheaf._records.ConstraintsLike = None"},
+                                             options, "sheaf._records.Covariance");
+  module.def("covariance", &covariance_of, nb::arg("problem"), nb::arg("options"),
+             nb::sig(signature.c_str()),
+             ("How well a state is known, which should be an optimum (docs/covariance.md).\n\n"
+              "  points: indices of the points to tell of; None: all; False: none\n"
+              "  constraints: a survey that takes part, as in solve\n" +
+              help_of(options))
+                 .c_str());
+}
+
+}  // namespace sheaf

@@ -1,0 +1,191 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "fork_safety.h"
+#include "keyword_options.h"
+#include "options/photometric_options.h"
+#include "options/scene_options.h"
+#include "running.h"
+#include "sheaf/io.h"
+#include "sheaf/solve.h"
+#include "summary_object.h"
+
+namespace sheaf {
+namespace {
+
+namespace fs = std::filesystem;
+using FolderHandle = std::shared_ptr<PhotometricFolder>;
+
+nb::dict copy_of(const nb::kwargs& keywords) { return nb::cast<nb::dict>(keywords.attr("copy")()); }
+
+FolderHandle read_folder(const fs::path& path, const nb::kwargs& keywords) {
+  nb::dict left = copy_of(keywords);
+  PhotometricReadOptions options;
+  take_options(left, bound(photometric_read_fields(), options));
+  check_all_taken(left, "read_photometric");
+  const nb::gil_scoped_release released;
+  return std::make_shared<PhotometricFolder>(read_photometric(path, options).value());
+}
+
+nb::tuple generate_folders(const nb::kwargs& keywords) {
+  nb::dict left = copy_of(keywords);
+  PhotometricSceneOptions options;
+  take_options(left, bound(photometric_scene_fields(), options));
+  const auto count = [&](const char* name, std::uint32_t& to) {
+    if (left.contains(name)) to = nb::cast<std::uint32_t>(left.attr("pop")(name));
+  };
+  count("cameras", options.images);
+  count("points", options.points);
+  if (left.contains("seed")) options.seed = nb::cast<std::uint64_t>(left.attr("pop")("seed"));
+  check_all_taken(left, "generate_photometric");
+  auto start = std::make_shared<PhotometricFolder>(), truth = std::make_shared<PhotometricFolder>();
+  {
+    const nb::gil_scoped_release released;
+    PhotometricScene scene = generate(options).value();
+    start->problem = std::move(scene.start);
+    truth->problem = std::move(scene.truth);
+    start->format = truth->format = "direct";
+  }
+  return nb::make_tuple(start, truth);
+}
+
+nb::object details_object(const PhotometricDetails& details, std::size_t points) {
+  std::vector<std::uint32_t> image, point;
+  std::vector<double> xy, rms;
+  for (const PatchSight& sight : details.seen) {
+    image.push_back(sight.image);
+    point.push_back(sight.point);
+    xy.insert(xy.end(), {sight.x, sight.y});
+    rms.push_back(sight.rms_grey);
+  }
+  const std::size_t columns = details.of_inverse_depth || points == 0 ? 1 : 3;
+  return nb::module_::import_("sheaf._records")
+      .attr("PhotometricDetails")(
+          array_of(point), array_of(image), array_of(xy, {rms.size(), 2}),
+          array_of(rms, {rms.size()}), details.sigma_grey,
+          array_of(details.sigma, {details.sigma.size() / columns, columns}),
+          details.of_inverse_depth);
+}
+
+nb::object refine(const FolderHandle& folder, const nb::kwargs& keywords) {
+  nb::dict left = copy_of(keywords);
+  Run run(left.attr("pop")("callback", nb::none()));
+  PhotometricOptions options;
+  take_options(left, bound(photometric_fields(), options));
+  check_all_taken(left, "photometric");
+  options.threads = threads_here(options.threads);
+  options.stop = run.token();
+  options.on_iteration = [&](const Iteration& iteration) { return run.report(iteration); };
+  PhotometricSummary summary;
+  PhotometricDetails details;
+  run.go([&] {
+    summary = refine_photometric(folder->problem, options).value();
+    PhotometricOptions at_end = options;
+    at_end.on_iteration = nullptr;
+    if (!summary.solve.rounds.empty()) at_end.loss.scale_px = summary.solve.rounds.back().scale_px;
+    details = examine_photometric(folder->problem, at_end).value();
+  });
+  const nb::object solved =
+      nb::module_::import_("sheaf._summary").attr("Summary")(**fields_of(summary.solve));
+  nb::dict out;
+  out["solve"] = solved;
+  out["patches_total"] = summary.patches_total;
+  out["patches_visible"] = summary.patches_visible;
+  out["patches_left"] = summary.patches_left;
+  out["initial_rms_grey"] = summary.initial_rms_grey;
+  out["final_rms_grey"] = summary.final_rms_grey;
+  out["initial_median_grey"] = summary.initial_median_grey;
+  out["final_median_grey"] = summary.final_median_grey;
+  out["initial_inlier_share"] = summary.initial_inlier_share;
+  out["final_inlier_share"] = summary.final_inlier_share;
+  out["details"] = details_object(details, folder->problem.num_points());
+  return nb::module_::import_("sheaf._records").attr("PhotometricSummary")(**out);
+}
+
+nb::object poses_of(const PhotometricFolder& folder) {
+  const std::vector<Pose>& poses = folder.problem.poses;
+  return array_of(poses.empty() ? nullptr : poses.front().rotation.data(), {poses.size(), 7});
+}
+
+nb::object brightness_of(const PhotometricFolder& folder) {
+  std::vector<double> out;
+  for (const Brightness& b : folder.problem.brightness) out.insert(out.end(), {b.a, b.b});
+  return array_of(out, {out.size() / 2, 2});
+}
+
+void write_folder(const FolderHandle& folder, const fs::path& path) {
+  const nb::gil_scoped_release released;
+  write_photometric(*folder, path).value();
+}
+
+void bind_folder(nb::module_& module) {
+  nb::class_<PhotometricFolder>(
+      module, "PhotometricFolder",
+      "Images with their poses, and points with their grey patches (docs/photometric.md).")
+      .def_prop_ro("poses", &poses_of,
+                   nb::sig("def poses(self) -> numpy.typing.NDArray[numpy.float64]"),
+                   "(n, 7): qw qx qy qz tx ty tz, cam_from_world; a copy.")
+      .def_prop_ro(
+          "points",
+          [](const PhotometricFolder& f) {
+            return array_of(f.problem.points, {f.problem.num_points(), 3});
+          },
+          nb::sig("def points(self) -> numpy.typing.NDArray[numpy.float64]"),
+          "(m, 3): X, Y, Z, scene units; a copy.")
+      .def_prop_ro("brightness", &brightness_of,
+                   nb::sig("def brightness(self) -> numpy.typing.NDArray[numpy.float64]"),
+                   "(n, 2): a, b of each image, or (0, 2) where all are (1, 0); a copy.")
+      .def_prop_ro("num_images", [](const PhotometricFolder& f) { return f.problem.images.size(); })
+      .def_prop_ro("num_points", [](const PhotometricFolder& f) { return f.problem.num_points(); })
+      .def_prop_ro("format", [](const PhotometricFolder& f) { return f.format; })
+      .def_prop_ro("notes", [](const PhotometricFolder& f) { return f.notes; })
+      .def("write", &write_folder, nb::arg("path"),
+           nb::sig("def write(self, path: str | os.PathLike[str]) -> None"),
+           "Writes the state in the folder's own format into a folder.");
+}
+
+}  // namespace
+
+void bind_photometric(nb::module_& module) {
+  bind_folder(module);
+  PhotometricReadOptions reading;
+  const auto of_reading = bound(photometric_read_fields(), reading);
+  module.def("read_photometric", &read_folder, nb::arg("path"), nb::arg("options"),
+             nb::sig(signature_of("read_photometric", "path: str | os.PathLike[str]", {},
+                                  of_reading, "PhotometricFolder")
+                         .c_str()),
+             ("Reads a folder of images with poses and points.\n" + help_of(of_reading)).c_str());
+  PhotometricSceneOptions scene;
+  const auto of_scene = bound(photometric_scene_fields(), scene);
+  module.def("generate_photometric", &generate_folders, nb::arg("options"),
+             nb::sig(signature_of("generate_photometric", "",
+                                  {"cameras: int = 6", "points: int = 2000", "seed: int = 1"},
+                                  of_scene, "tuple[PhotometricFolder, PhotometricFolder]")
+                         .c_str()),
+             ("Images of a textured surface: (start, truth).\n" + help_of(of_scene)).c_str());
+  PhotometricOptions fresh;
+  const auto options = bound(photometric_fields(), fresh);
+  module.def("photometric", &refine, nb::arg("folder"), nb::arg("options"),
+             nb::sig(signature_of("photometric", "folder: PhotometricFolder",
+                                  {"callback: collections.abc.Callable[[Iteration], bool | None] | "
+                                   "None = None"},
+                                  options, "sheaf._records.PhotometricSummary")
+                         .c_str()),
+             ("Refines poses and points from the pixels of images, in place. Where a Summary says "
+              "px its numbers are grey levels.\n" +
+              help_of(options))
+                 .c_str());
+}
+
+}  // namespace sheaf
