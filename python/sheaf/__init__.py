@@ -46,6 +46,10 @@ __version__: str = VERSION
 #: Names of the camera models, by the numbers that records of cameras have.
 CAMERA_MODELS: tuple[str, ...] = camera_models()
 
+for _name in ("Camera", "Error", "ErrorCode", "Rigs", "Summary"):
+    globals()[_name].__module__ = "sheaf"  # as tracebacks and pickles have them
+del _name
+
 __all__ = [
     "CAMERA_MODELS",
     "Alignment",
