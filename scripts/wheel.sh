@@ -34,7 +34,7 @@ build_wheel() {
   local python=$1 env=build/wheel-env-$2
   "$python" -m venv "$env"
   "$env/bin/python" -m pip install --quiet --disable-pip-version-check \
-    'scikit-build-core>=0.10,<2' 'nanobind>=3.1,<4' numpy 'cmake>=3.26' ninja
+    'scikit-build-core>=0.10,<2' 'nanobind>=3.1,<4' numpy
   rm -rf build/wheel-raw
   PATH=$PWD/$env/bin:$PATH "$env/bin/python" -m pip wheel . --quiet --disable-pip-version-check \
     --no-build-isolation --no-deps --wheel-dir build/wheel-raw \

@@ -58,8 +58,8 @@ nb::object clean_problem(const ProblemHandle& held, const nb::kwargs& keywords) 
   CleanOptions options;
   take_options(left, bound(clean_fields(), options));
   check_all_taken(left, "clean");
-  const WriteUse use(held);
-  held->check_resizable("clean");
+  WriteUse use(held);
+  use.resize("clean");
   CleanRecord record;
   {
     const nb::gil_scoped_release released;
@@ -86,8 +86,8 @@ std::vector<std::string> convert_file(const fs::path& in, const fs::path& out,
 }
 
 std::vector<std::string> lay_rigs_of_file(const ProblemHandle& held, const fs::path& path) {
-  const WriteUse use(held);
-  held->check_resizable("lay_rigs");
+  WriteUse use(held);
+  use.resize("lay_rigs");
   const nb::gil_scoped_release released;
   const RigConfigurationFile file = read_rig_configuration(path).value();
   const Result<RigLayout> laid = lay_rigs(use.problem(), file.rigs);

@@ -11,12 +11,15 @@ std::size_t HeldProblem::views() const {
   return views_;
 }
 
-void HeldProblem::check_resizable(const char* what) const {
-  if (const std::size_t count = views(); count > 0)
-    throw Error(ErrorCode::usage, std::string(what) + " would resize a problem that " +
-                                      std::to_string(count) +
-                                      (count == 1 ? " array is a view" : " arrays are views") +
-                                      " of: let them go (del), or work on a copy (problem.copy())");
+void HeldProblem::refuse_resize(const std::string& what) const {
+  throw Error(ErrorCode::usage, what + " would resize a problem that " + std::to_string(views_) +
+                                    (views_ == 1 ? " array is a view" : " arrays are views") +
+                                    " of: let them go (del), or work on a copy (problem.copy())");
+}
+
+void HeldProblem::check_resizable(const std::string& what) const {
+  const std::lock_guard lock(mutex_);
+  if (views_ > 0) refuse_resize(what);
 }
 
 void HeldProblem::check_idle() const {
@@ -27,10 +30,10 @@ void HeldProblem::check_idle() const {
 
 void HeldProblem::check_at_hand() const {
   const std::lock_guard lock(mutex_);
-  if (lends_)
+  if (alone_)
     throw Error(ErrorCode::usage,
-                "the problem is being solved, and its observations are lent to the solver until "
-                "that ends: solve with a callback, or with a view alive, to look at it meanwhile");
+                "the problem is in use by a call that has its arrays for itself until it ends (a "
+                "solve leaves them at hand with a callback, or while a view lives)");
 }
 
 ViewPin::ViewPin(ProblemHandle held) : held_(std::move(held)) {
@@ -63,13 +66,19 @@ WriteUse::WriteUse(ProblemHandle held) : held_(std::move(held)) {
 
 WriteUse::~WriteUse() {
   const std::lock_guard lock(held_->mutex_);
-  held_->writes_ = held_->lends_ = false;
+  held_->writes_ = held_->alone_ = false;
 }
 
-bool WriteUse::lend() {
+bool WriteUse::alone() {
   const std::lock_guard lock(held_->mutex_);
-  if (held_->views_ == 0) held_->lends_ = true;
-  return held_->lends_;
+  if (held_->views_ == 0) held_->alone_ = true;
+  return held_->alone_;
+}
+
+void WriteUse::resize(const std::string& what) {
+  const std::lock_guard lock(held_->mutex_);
+  if (held_->views_ > 0) held_->refuse_resize(what);
+  held_->alone_ = true;
 }
 
 }  // namespace sheaf

@@ -29,10 +29,10 @@ class HeldProblem {
   /// How many arrays of NumPy look at the vectors.
   std::size_t views() const;
   /// Throws Error (usage) where a view would be left behind: while one lives, no vector moves.
-  void check_resizable(const char* what) const;
+  void check_resizable(const std::string& what) const;
   /// Throws Error (usage) while a call changes the problem.
   void check_idle() const;
-  /// Throws Error (usage) while the problem's observations are lent to a solve.
+  /// Throws Error (usage) while a call has the vectors for itself, since it resizes them.
   void check_at_hand() const;
 
  private:
@@ -42,7 +42,9 @@ class HeldProblem {
   mutable std::mutex mutex_;
   std::size_t views_ = 0;
   int readers_ = 0;
-  bool writes_ = false, lends_ = false;
+  bool writes_ = false, alone_ = false;
+
+  void refuse_resize(const std::string& what) const;
 };
 
 using ProblemHandle = std::shared_ptr<HeldProblem>;
@@ -80,9 +82,11 @@ class WriteUse {
   WriteUse(const WriteUse&) = delete;
   WriteUse& operator=(const WriteUse&) = delete;
   Problem& problem() const { return held_->problem; }
-  /// From now on the observations are not at hand. Returns false, and changes nothing, where a view
-  /// looks at them.
-  bool lend();
+  /// From now on nobody else gets at the vectors, so that they may be resized. Returns false, and
+  /// changes nothing, where a view looks at them.
+  bool alone();
+  /// The same. Throws Error (usage) where a view looks at them; \`what\` stands in its message.
+  void resize(const std::string& what);
 
  private:
   ProblemHandle held_;

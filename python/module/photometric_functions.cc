@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -25,7 +26,32 @@ namespace sheaf {
 namespace {
 
 namespace fs = std::filesystem;
-using FolderHandle = std::shared_ptr<PhotometricFolder>;
+/// A folder that Python holds; one call at a time works on it.
+struct HeldFolder : PhotometricFolder {
+  std::atomic<bool> used{false};
+};
+using FolderHandle = std::shared_ptr<HeldFolder>;
+
+/// Throws Error (usage) while another call works on the folder.
+class FolderUse {
+ public:
+  explicit FolderUse(HeldFolder& folder) : folder_(folder) {
+    if (folder.used.exchange(true))
+      throw Error(ErrorCode::usage, "the folder is in use by another call");
+  }
+  ~FolderUse() { folder_.used = false; }
+  FolderUse(const FolderUse&) = delete;
+  FolderUse& operator=(const FolderUse&) = delete;
+
+ private:
+  HeldFolder& folder_;
+};
+
+FolderHandle held(PhotometricFolder folder) {
+  auto out = std::make_shared<HeldFolder>();
+  static_cast<PhotometricFolder&>(*out) = std::move(folder);
+  return out;
+}
 
 nb::dict copy_of(const nb::kwargs& keywords) { return nb::cast<nb::dict>(keywords.attr("copy")()); }
 
@@ -35,7 +61,7 @@ FolderHandle read_folder(const fs::path& path, const nb::kwargs& keywords) {
   take_options(left, bound(photometric_read_fields(), options));
   check_all_taken(left, "read_photometric");
   const nb::gil_scoped_release released;
-  return std::make_shared<PhotometricFolder>(read_photometric(path, options).value());
+  return held(read_photometric(path, options).value());
 }
 
 nb::tuple generate_folders(const nb::kwargs& keywords) {
@@ -49,7 +75,7 @@ nb::tuple generate_folders(const nb::kwargs& keywords) {
   count("points", options.points);
   if (left.contains("seed")) options.seed = nb::cast<std::uint64_t>(left.attr("pop")("seed"));
   check_all_taken(left, "generate_photometric");
-  auto start = std::make_shared<PhotometricFolder>(), truth = std::make_shared<PhotometricFolder>();
+  auto start = std::make_shared<HeldFolder>(), truth = std::make_shared<HeldFolder>();
   {
     const nb::gil_scoped_release released;
     PhotometricScene scene = generate(options).value();
@@ -84,6 +110,7 @@ nb::object refine(const FolderHandle& folder, const nb::kwargs& keywords) {
   PhotometricOptions options;
   take_options(left, bound(photometric_fields(), options));
   check_all_taken(left, "photometric");
+  const FolderUse use(*folder);
   options.threads = threads_here(options.threads);
   options.stop = run.token();
   options.on_iteration = [&](const Iteration& iteration) { return run.report(iteration); };
@@ -113,24 +140,27 @@ nb::object refine(const FolderHandle& folder, const nb::kwargs& keywords) {
   return nb::module_::import_("sheaf._records").attr("PhotometricSummary")(**out);
 }
 
-nb::object poses_of(const PhotometricFolder& folder) {
+nb::object poses_of(HeldFolder& folder) {
+  const FolderUse use(folder);
   const std::vector<Pose>& poses = folder.problem.poses;
   return array_of(poses.empty() ? nullptr : poses.front().rotation.data(), {poses.size(), 7});
 }
 
-nb::object brightness_of(const PhotometricFolder& folder) {
+nb::object brightness_of(HeldFolder& folder) {
+  const FolderUse use(folder);
   std::vector<double> out;
   for (const Brightness& b : folder.problem.brightness) out.insert(out.end(), {b.a, b.b});
   return array_of(out, {out.size() / 2, 2});
 }
 
 void write_folder(const FolderHandle& folder, const fs::path& path) {
+  const FolderUse use(*folder);
   const nb::gil_scoped_release released;
   write_photometric(*folder, path).value();
 }
 
 void bind_folder(nb::module_& module) {
-  nb::class_<PhotometricFolder>(
+  nb::class_<HeldFolder>(
       module, "PhotometricFolder",
       "Images with their poses, and points with their grey patches (docs/photometric.md).")
       .def_prop_ro("poses", &poses_of,
@@ -138,7 +168,8 @@ void bind_folder(nb::module_& module) {
                    "(n, 7): qw qx qy qz tx ty tz, cam_from_world; a copy.")
       .def_prop_ro(
           "points",
-          [](const PhotometricFolder& f) {
+          [](HeldFolder& f) {
+            const FolderUse use(f);
             return array_of(f.problem.points, {f.problem.num_points(), 3});
           },
           nb::sig("def points(self) -> numpy.typing.NDArray[numpy.float64]"),
@@ -146,10 +177,10 @@ void bind_folder(nb::module_& module) {
       .def_prop_ro("brightness", &brightness_of,
                    nb::sig("def brightness(self) -> numpy.typing.NDArray[numpy.float64]"),
                    "(n, 2): a, b of each image, or (0, 2) where all are (1, 0); a copy.")
-      .def_prop_ro("num_images", [](const PhotometricFolder& f) { return f.problem.images.size(); })
-      .def_prop_ro("num_points", [](const PhotometricFolder& f) { return f.problem.num_points(); })
-      .def_prop_ro("format", [](const PhotometricFolder& f) { return f.format; })
-      .def_prop_ro("notes", [](const PhotometricFolder& f) { return f.notes; })
+      .def_prop_ro("num_images", [](const HeldFolder& f) { return f.problem.images.size(); })
+      .def_prop_ro("num_points", [](const HeldFolder& f) { return f.problem.num_points(); })
+      .def_prop_ro("format", [](const HeldFolder& f) { return f.format; })
+      .def_prop_ro("notes", [](const HeldFolder& f) { return f.notes; })
       .def("write", &write_folder, nb::arg("path"),
            nb::sig("def write(self, path: str | os.PathLike[str]) -> None"),
            "Writes the state in the folder's own format into a folder.");

@@ -79,7 +79,14 @@ void construct(HeldProblem* self, nb::handle poses, nb::handle points, nb::handl
   self->problem = std::move(p);
 }
 
+template <std::size_t (Problem::*kCount)() const>
+std::size_t count_of(const HeldProblem& held) {
+  held.check_at_hand();
+  return (held.problem.*kCount)();
+}
+
 nb::object names_of(const HeldProblem& held) {
+  held.check_at_hand();
   const SceneMetadata* m = held.problem.metadata.get();
   if (m == nullptr || m->image_names.empty()) return nb::none();
   return nb::cast(m->image_names);
@@ -163,13 +170,9 @@ ProblemClass bind_problem(nb::module_& module) {
            [](const HeldProblem& held) {
              return "<sheaf.Problem: " + counts_text(held.problem) + ">";
            })
-      .def_prop_ro("num_images", [](const HeldProblem& held) { return held.problem.num_images(); })
-      .def_prop_ro("num_points", [](const HeldProblem& held) { return held.problem.num_points(); })
-      .def_prop_ro("num_observations",
-                   [](const HeldProblem& held) {
-                     held.check_at_hand();
-                     return held.problem.num_observations();
-                   })
+      .def_prop_ro("num_images", &count_of<&Problem::num_images>)
+      .def_prop_ro("num_points", &count_of<&Problem::num_points>)
+      .def_prop_ro("num_observations", &count_of<&Problem::num_observations>)
       .def_prop_rw(
           "names", &names_of,
           [](HeldProblem& held, const std::vector<std::string>& names) {

@@ -31,6 +31,7 @@ nb::object words_view(const ProblemHandle& held, std::vector<Word>& words) {
 }
 
 nb::object cameras_view(const ProblemHandle& held) {
+  held->check_at_hand();
   std::vector<Camera>& cameras = held->problem.cameras;
   if (cameras.empty()) return nb::module_::import_("numpy").attr("empty")(0, camera_dtype());
   auto* bytes = reinterpret_cast<std::uint8_t*>(cameras.data());
@@ -38,6 +39,7 @@ nb::object cameras_view(const ProblemHandle& held) {
 }
 
 nb::object rigs_view(const ProblemHandle& held) {
+  held->check_at_hand();
   Rigs& rigs = held->problem.rigs;
   if (rigs.empty()) return nb::none();
   return nb::module_::import_("sheaf._records")
@@ -56,7 +58,7 @@ void assign(const ProblemHandle& held, std::vector<Element>& to, std::vector<Ele
     std::copy(from.begin(), from.end(), to.begin());
     return;
   }
-  held->check_resizable((std::string("setting ") + name).c_str());
+  held->check_resizable(std::string("setting ") + name);
   to = std::move(from);
 }
 
@@ -123,6 +125,7 @@ void bind_views(ProblemClass& problem) {
   problem.def(
       "camera",
       [](const HeldProblem& held, std::size_t index) {
+        held.check_at_hand();
         if (index >= held.problem.cameras.size())
           throw nb::index_error("the problem has no such camera");
         return camera_object(held.problem.cameras[index]);

@@ -104,8 +104,8 @@ SurveyTies ties_named(const std::string& to) {
 
 nb::object align_to_survey(const ProblemHandle& held, const Constraints& constraints,
                            const std::string& to, bool rigid) {
-  const WriteUse use(held);
-  held->check_resizable("align with constraints");
+  WriteUse use(held);
+  use.resize("align with constraints");
   const SurveyMotionOptions options{.by = ties_named(to), .rigid = rigid};
   std::optional<Survey> survey;
   SurveyReport report;

@@ -56,8 +56,8 @@ nb::object perturb_problem(const ProblemHandle& held, const nb::kwargs& keywords
   NoiseOptions options;
   take_options(left, bound(noise_fields(), options));
   check_all_taken(left, "perturb");
-  const WriteUse use(held);
-  if (options.least_depth > 0) held->check_resizable("perturb with min_depth");
+  WriteUse use(held);
+  if (options.least_depth > 0) use.resize("perturb with min_depth");
   NoiseRecord record;
   {
     const nb::gil_scoped_release released;

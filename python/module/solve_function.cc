@@ -81,8 +81,9 @@ nb::object solve_problem(const ProblemHandle& held, const nb::kwargs& keywords) 
   options.threads = threads_here(options.threads);
   options.on_iteration = [&](const Iteration& iteration) { return run.report(iteration); };
   // A survey adds points and marks for a while, which views would not live through.
-  const bool on_copy = constraints && held->views() > 0;
-  options.lend_observations = !run.has_callback() && !on_copy && use.lend();
+  const bool alone = !run.has_callback() && use.alone();
+  const bool on_copy = constraints && !alone;
+  options.lend_observations = alone;
   SurveyedSolve solved;
   run.go([&] {
     if (on_copy) {

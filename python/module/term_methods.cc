@@ -14,6 +14,7 @@
 #include "bindings.h"
 #include "geometry/camera_model.h"
 #include "options/loss_option.h"
+#include "scene/terms.h"
 
 namespace sheaf {
 namespace {
@@ -77,9 +78,9 @@ template <class Term>
 void add(const ProblemHandle& held, std::vector<Term>& list, Term term) {
   const WriteUse use(held);
   list.push_back(std::move(term));
-  if (const Result<void> valid = validate(use.problem()); !valid.ok()) {
+  if (const auto wrong = wrong_terms(use.problem())) {
     list.pop_back();
-    throw valid.error();
+    throw Error(ErrorCode::usage, *wrong);
   }
 }
 

@@ -169,8 +169,17 @@ class Priors(unittest.TestCase):
 class Photometric(unittest.TestCase):
     def test_refines_and_writes(self):
         start, truth = sheaf.generate_photometric(cameras=3, points=300, seed=3)
-        seen = []
-        summary = sheaf.photometric(start, max_iterations=20, callback=seen.append)
+        seen, refused = [], []
+
+        def callback(iteration):
+            seen.append(iteration)
+            try:
+                start.poses
+            except sheaf.Error as error:
+                refused.append(str(error))
+
+        summary = sheaf.photometric(start, max_iterations=20, callback=callback)
+        self.assertEqual(set(refused), {"the folder is in use by another call"})
         self.assertLess(summary.final_rms_grey, 0.2 * summary.initial_rms_grey)
         self.assertEqual(len(seen), len(summary.solve.iterations))
         self.assertEqual(summary.details.sigma.shape[0], start.num_points)
