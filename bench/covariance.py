@@ -5,6 +5,7 @@
 
   covariance.py SHEAF [--images 100,500] [--cpu]      side by side: values and seconds
   covariance.py SHEAF --large                         street, collection, dubrovnik-356: seconds, memory
+  covariance.py SHEAF --ceres PROGRAM                 values of a small scene beside Ceres' dense SVD
 
 Side by side: a model is generated and solved by `sheaf`; both then tell the covariances of its state in
 the same gauge (the first pose and one coordinate of the second's translation), sigma 1, no damping, one
@@ -16,7 +17,8 @@ delta t = rho + phi x t. Differences are those of covariances, in sigmas of thei
 pycolmap is asked of the Python of --python or of SHEAF_PYCOLMAP_PYTHON; without it its columns stay
 empty. On long streets (--street) COLMAP's matrix without damping is singular to its precision: it finds
 none or gives numbers that are not finite (inf). The large scenes are looked at where they start, which
-makes no difference to time and memory.
+makes no difference to time and memory. PROGRAM is peer-ceres-covariance of bench/peers: a BAL scene of
+eight images, in the same gauge; translations, lenses and points are compared.
 """
 import argparse
 import json
@@ -57,6 +59,7 @@ def parse_arguments():
     parser.add_argument("--cpu", action="store_true",
                         help="processor seconds in place of the clock's, of the whole process of Sheaf")
     parser.add_argument("--large", action="store_true", help="the large scenes, by Sheaf alone")
+    parser.add_argument("--ceres", metavar="PROGRAM", help="compare with Ceres by this program")
     parser.add_argument("--colmap", metavar="OUT", help="ask pycolmap of one model: used by itself")
     return parser.parse_args()
 
@@ -233,6 +236,39 @@ def large_row(a, folder, name, words, seconds, memory):
             limits[0], f"{peak / 1e9:.2f}", limits[1]]
 
 
+def beside_ceres(a, folder):
+    """The largest differences, in sigmas, of a small scene's translations, lenses and points."""
+    start, state, theirs = (os.path.join(folder, name) for name in ("s.txt", "m.txt", "ceres.json"))
+    run([a.sheaf, "generate", start, "--cameras", "8", "--points", "60", "--quiet"])
+    run([a.sheaf, "solve", start, "-o", state, "--tolerance", "1e-14", "--threads", "1", "--quiet"])
+    run([a.ceres, state, theirs])
+    theirs = read_json(theirs)
+    ids = ",".join(str(p) for p in range(len(theirs["points"])))
+    ours = by_sheaf(a, folder, state, ["--points", ids])[0]
+    with open(state) as file:
+        numbers = [float(x) for line in file.read().split("\n")[1 + ours["input"]["observations"]:]
+                   for x in line.split()]
+    worst = {"translations": 0, "lenses": 0, "points": 0}
+    for k, image in enumerate(ours["images"]):
+        moved = as_colmap(image["covariance"], numbers[9 * k + 3:9 * k + 6])
+        mine = [row[3:] for row in moved[3:]]
+        worst["translations"] = max(worst["translations"],
+                                    between(square(theirs["translations"][k]), mine))
+    for C, lens in zip(theirs["lenses"], ours["cameras"]):
+        worst["lenses"] = max(worst["lenses"], between(square(C), square(lens["covariance"])))
+    for C, point in zip(theirs["points"], ours["points"]["list"]):
+        worst["points"] = max(worst["points"], between(square(C), square(point["covariance"])))
+    for name, off in worst.items():
+        print(f"{name}: at most {off:.1e} sigmas apart")
+
+
+def between(theirs, ours):
+    """As `difference`, of all that neither holds."""
+    free = [k for k in range(len(theirs)) if theirs[k][k] > 1e-14]
+    return max([abs(theirs[i][k] - ours[i][k]) / math.sqrt(theirs[i][i] * theirs[k][k])
+                for i in free for k in free], default=0)
+
+
 def print_row(cells):
     print("| " + " | ".join(cells) + " |", flush=True)
 
@@ -243,6 +279,9 @@ def main():
         ask_colmap(a)
         return
     with tempfile.TemporaryDirectory() as folder:
+        if a.ceres:
+            beside_ceres(a, folder)
+            return
         if a.large:
             print_row(["scene", "images", "observations", "s", "limit", "GB", "limit"])
             print_row(["---"] + ["--:"] * 6)

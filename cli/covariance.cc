@@ -17,9 +17,11 @@
 #include "json_document.h"
 #include "options/refinement.h"
 #include "outputs.h"
+#include "projection_option.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "survey/image_names.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -32,7 +34,8 @@ struct Arguments {
   RefinementArguments refinement;
   RigsArguments rigs;
   ConstraintsArguments constraints;
-  std::vector<std::string> points;
+  ProjectionArguments projection;
+  std::vector<std::string> points, poses, pairs;
   std::string in, csv;
 };
 
@@ -68,11 +71,38 @@ void choose_points(const Arguments& arguments, const Problem& problem, Covarianc
   options.point_ids = points_named(arguments.points, problem);
 }
 
+std::vector<std::uint32_t> images_named(const char* option, const std::vector<std::string>& names,
+                                        const Problem& problem) {
+  const ImageNames images(problem);
+  std::vector<std::uint32_t> out;
+  for (const std::string& name : names) {
+    out.push_back(images.find(name));
+    if (out.back() == Survey::kNone)
+      throw Error(ErrorCode::usage,
+                  std::string(option) + ": no image of the model is called " + name);
+  }
+  return out;
+}
+
+void choose_images(const Arguments& arguments, const Problem& problem, CovarianceOptions& options) {
+  if (arguments.poses != std::vector<std::string>{"all"})
+    options.image_ids = images_named("--poses", arguments.poses, problem);
+  if (arguments.pairs.size() % 2 != 0)
+    throw Error(ErrorCode::usage, "--pairs: found " + std::to_string(arguments.pairs.size()) +
+                                      " images, expected two for each pair");
+  const std::vector<std::uint32_t> ends = images_named("--pairs", arguments.pairs, problem);
+  for (std::size_t k = 0; k < ends.size(); k += 2)
+    options.image_pairs.push_back({ends[k], ends[k + 1]});
+}
+
 int run(const Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const std::string& json = arguments.common.json;
-  check_outputs({{"--json", json}, {"--csv", arguments.csv}},
+  check_outputs({{"--json", json},
+                 {"--csv", arguments.csv},
+                 {"--projection", arguments.projection.csv},
+                 {"--projection-figure", arguments.projection.figure}},
                 with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
   InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
   Problem& problem = input.problem;
@@ -80,19 +110,25 @@ int run(const Arguments& arguments) {
   CovarianceOptions options = arguments.covariance;
   options.threads = arguments.common.threads;
   choose_points(arguments, problem, options);
+  choose_images(arguments, problem, options);
+  options.lens_motions = arguments.projection.asked();
   if (arguments.refinement.given())
     options.fixed = fixed_of(refinement_of(arguments.refinement, problem).value(), problem);
   const std::optional<Survey> survey = place_survey(arguments.constraints, problem, options.fixed);
   const Covariance found = covariance(problem, options).value();
   fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
   if (survey) fmt::print("{}", survey_text(*survey));
-  fmt::print("{}time        {:.3f} s\n", covariance_text(problem, found), found.seconds);
+  const std::vector<LensProjection> projected = projections(arguments.projection, problem, found);
+  fmt::print("{}{}time        {:.3f} s\n", covariance_text(problem, options, found),
+             projection_text(projected), found.seconds);
   if (!arguments.csv.empty()) {
     write_text(covariance_csv(problem, options, found), arguments.csv);
     fmt::print("wrote       {}\n", arguments.csv);
   }
+  write_projections(arguments.projection, problem, projected);
   if (json.empty()) return 0;
   Json document = covariance_json(problem, options, found);
+  document["projection"] = projection_json(projected);
   document["version"] = SHEAF_VERSION;
   document["input"] = input_json(arguments.in, input);
   document["time"] = {
@@ -109,6 +145,14 @@ std::vector<BoundOption> options_of(Arguments& a) {
                 .placeholder = "IDS",
                 .help = "points to tell of one by one, by their ids; all: of all together (the "
                         "default); none"}),
+       F::list(&Arguments::poses, {.name = "poses",
+                                   .placeholder = "NAMES",
+                                   .help = "images to tell of, by their names; all: the default"}),
+       F::list(&Arguments::pairs,
+               {.name = "pairs",
+                .placeholder = "A,B,C,D...",
+                .help = "pairs of images (A with B, C with D) whose common covariance is told, and "
+                        "how well the distance between them is known"}),
        F::text(&Arguments::csv,
                {.name = "csv", .placeholder = "FILE", .help = "a line for each parameter"})},
       a);
@@ -124,10 +168,12 @@ Verb covariance_verb() {
   Verb verb{"covariance", "tell how well a state is known, which should be an optimum",
             "Example:\n  sheaf covariance problem.txt --json sigmas.json\n"
             "\nWhat its lens and three of its points are known to, in the gauge of two images:\n"
-            "  sheaf covariance model --gauge first-two --points 4711,4712,4713 --csv sigmas.csv"};
+            "  sheaf covariance model --gauge first-two --points 4711,4712,4713 --csv sigmas.csv\n"
+            "\nHow well a calibration knows where its lens looks, far away and at 2 m:\n"
+            "  sheaf covariance boards --fix points --projection sigmas.csv --distance 2"};
   verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
   verb.options = joined({options_of(*a), options_of(a->rigs), options_of(a->constraints, false),
-                         options_of(a->common)});
+                         options_of(a->projection), options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -63,13 +63,31 @@ std::size_t point_at(const CovarianceOptions& options, std::size_t k) {
   return options.point_ids.empty() ? k : options.point_ids[k];
 }
 
-Json poses_json(const Problem& problem, const Covariance& of) {
+std::uint32_t image_at(const CovarianceOptions& options, std::size_t k) {
+  return options.image_ids.empty() ? static_cast<std::uint32_t>(k) : options.image_ids[k];
+}
+
+Json poses_json(const Problem& problem, const CovarianceOptions& options, const Covariance& of) {
   Json out = Json::array();
-  for (std::size_t i = 0; i < of.poses.size(); ++i)
-    out.push_back({{"image", image_name(problem.metadata.get(), static_cast<std::uint32_t>(i))},
-                   {"center_sigma", numbers(sigmas(of.centres[i], 3))},
-                   {"rotation_sigma_deg", numbers(sigmas(of.poses[i], 6, 3), kDegrees)},
-                   {"covariance", all_of(of.poses[i])}});
+  for (std::size_t k = 0; k < of.poses.size(); ++k)
+    out.push_back({{"image", image_name(problem.metadata.get(), image_at(options, k))},
+                   {"center_sigma", numbers(sigmas(of.centres[k], 3))},
+                   {"rotation_sigma_deg", numbers(sigmas(of.poses[k], 6, 3), kDegrees)},
+                   {"covariance", all_of(of.poses[k])}});
+  return out;
+}
+
+Json pairs_json(const Problem& problem, const CovarianceOptions& options, const Covariance& of) {
+  Json out = Json::array();
+  for (std::size_t k = 0; k < of.pairs.size(); ++k) {
+    Json names = Json::array();
+    for (const std::uint32_t image : options.image_pairs[k])
+      names.push_back(image_name(problem.metadata.get(), image));
+    out.push_back({{"images", names},
+                   {"distance", number(of.distances[k].value)},
+                   {"distance_sigma", number(of.distances[k].sigma)},
+                   {"covariance", all_of(of.pairs[k])}});
+  }
   return out;
 }
 
@@ -82,6 +100,11 @@ Json moving_json(const std::vector<Covariance6>& all) {
   return out;
 }
 
+/// Not a number where the lens was not asked for.
+double sigma_of(const std::vector<double>& lens, std::size_t n, std::size_t p) {
+  return lens.empty() ? std::numeric_limits<double>::quiet_NaN() : std::sqrt(lens[(n + 1) * p]);
+}
+
 Json cameras_json(const Problem& problem, const Covariance& of) {
   Json out = Json::array();
   for (std::size_t c = 0; c < of.lenses.size(); ++c) {
@@ -91,7 +114,7 @@ Json cameras_json(const Problem& problem, const Covariance& of) {
     for (std::size_t p = 0; p < names.size(); ++p)
       parameters.push_back({{"name", names[p]},
                             {"value", number(camera.parameters[p])},
-                            {"sigma", number(std::sqrt(of.lenses[c][(names.size() + 1) * p]))}});
+                            {"sigma", number(sigma_of(of.lenses[c], names.size(), p))}});
     out.push_back({{"model", to_string(camera.model)},
                    {"parameters", parameters},
                    {"covariance", all_of(of.lenses[c])}});
@@ -214,7 +237,9 @@ Json covariance_json(const Problem& problem, const CovarianceOptions& options,
           {"rows", of.rows},
           {"unknowns", of.unknowns},
           {"redundancy", number(of.redundancy)},
-          {"images", poses_json(problem, of)},
+          {"solver", of.solver == CovarianceSolver::factor ? "factor" : "conjugate-gradients"},
+          {"images", poses_json(problem, options, of)},
+          {"pairs", pairs_json(problem, options, of)},
           {"frames", moving_json(of.frames)},
           {"sensors", moving_json(of.sensors)},
           {"cameras", cameras_json(problem, of)},
@@ -230,8 +255,9 @@ std::string covariance_csv(const Problem& problem, const CovarianceOptions& opti
   static const char* const kTurns[] = {"turn_x_deg", "turn_y_deg", "turn_z_deg"};
   std::string out = "kind,name,parameter,value,sigma\n";
   for (std::size_t i = 0; i < of.poses.size(); ++i) {
-    const std::string name = image_name(problem.metadata.get(), static_cast<std::uint32_t>(i));
-    const Pose& pose = problem.poses[i];
+    const std::uint32_t image = image_at(options, i);
+    const std::string name = image_name(problem.metadata.get(), image);
+    const Pose& pose = problem.poses[image];
     const Vector3<double> C = camera_centre(matrix_from_quaternion(pose.rotation), pose);
     for (std::size_t k = 0; k < 3; ++k)
       add_line(out, "center", name, kAxes[k], C[k], std::sqrt(of.centres[i][4 * k]));
@@ -243,7 +269,7 @@ std::string covariance_csv(const Problem& problem, const CovarianceOptions& opti
     const auto names = parameter_names(camera.model);
     for (std::size_t p = 0; p < names.size(); ++p)
       add_line(out, "camera", std::to_string(c), std::string(names[p]).c_str(),
-               camera.parameters[p], std::sqrt(of.lenses[c][(names.size() + 1) * p]));
+               camera.parameters[p], sigma_of(of.lenses[c], names.size(), p));
   }
   for (std::size_t k = 0; k < of.points.size(); ++k) {
     const std::size_t p = point_at(options, k);
@@ -254,7 +280,8 @@ std::string covariance_csv(const Problem& problem, const CovarianceOptions& opti
   return out;
 }
 
-std::string covariance_text(const Problem& problem, const Covariance& of) {
+std::string covariance_text(const Problem& problem, const CovarianceOptions& options,
+                            const Covariance& of) {
   std::string out;
   for (const std::string& words : of.words) out += fmt::format("note        {}\n", words);
   std::vector<std::size_t> order(of.centres.size());
@@ -265,7 +292,12 @@ std::string covariance_text(const Problem& problem, const Covariance& of) {
   if (!order.empty())
     out += fmt::format("centres     sigma median {:.4g}, largest {:.4g} (image {})\n",
                        s(order[order.size() / 2]), s(order[0]),
-                       image_name(problem.metadata.get(), static_cast<std::uint32_t>(order[0])));
+                       image_name(problem.metadata.get(), image_at(options, order[0])));
+  for (std::size_t k = 0; k < of.distances.size(); ++k)
+    out += fmt::format("distance    {:.6g} +- {:.3g} between {} and {}\n", of.distances[k].value,
+                       of.distances[k].sigma,
+                       image_name(problem.metadata.get(), options.image_pairs[k][0]),
+                       image_name(problem.metadata.get(), options.image_pairs[k][1]));
   const std::vector<double> points = point_sigmas(of);
   if (!points.empty())
     out += fmt::format("points      sigma median {:.4g}, 90 % below {:.4g}, largest {:.4g}\n",
@@ -275,7 +307,7 @@ std::string covariance_text(const Problem& problem, const Covariance& of) {
     const auto names = parameter_names(problem.cameras[c].model);
     std::string line;
     for (std::size_t p = 0; p < names.size(); ++p)
-      if (const double sigma = std::sqrt(of.lenses[c][(names.size() + 1) * p]); sigma > 0)
+      if (const double sigma = sigma_of(of.lenses[c], names.size(), p); sigma > 0)
         line += fmt::format("{}{} {:.6g} +- {:.3g}", line.empty() ? "" : ", ", names[p],
                             problem.cameras[c].parameters[p], sigma);
     if (!line.empty()) out += fmt::format("camera {:<4} {}\n", c, line);

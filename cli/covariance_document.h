@@ -12,8 +12,8 @@ namespace sheaf {
 
 const char* to_string(Gauge gauge);
 
-/// gauge, sigma, redundancy, unknowns, then images, frames, sensors, cameras, points, observations
-/// and weak directions; points one by one where `point_ids` asks for them.
+/// gauge, sigma, redundancy, unknowns, then images, pairs of them, frames, sensors, cameras,
+/// points, observations and weak directions; points one by one where `point_ids` asks for them.
 Json covariance_json(const Problem& problem, const CovarianceOptions& options,
                      const Covariance& of);
 
@@ -22,6 +22,7 @@ std::string covariance_csv(const Problem& problem, const CovarianceOptions& opti
                            const Covariance& of);
 
 /// For people: the gauge, the noise, medians and worst ones, weak directions.
-std::string covariance_text(const Problem& problem, const Covariance& of);
+std::string covariance_text(const Problem& problem, const CovarianceOptions& options,
+                            const Covariance& of);
 
 }  // namespace sheaf

@@ -171,7 +171,7 @@ void say(const Arguments& arguments, const InputFile& input, const SolveRecord& 
                summary.threads);
   fmt::print("{}", summary_text(summary, input.read_s));
   fmt::print("{}", residuals_text(work.report));
-  if (sigmas.found) fmt::print("{}", covariance_text(input.problem, *sigmas.found));
+  if (sigmas.found) fmt::print("{}", covariance_text(input.problem, {}, *sigmas.found));
   fmt::print("{}", held);
   if (!record.agrees)
     fmt::print(

@@ -28,6 +28,7 @@ Verb perturb_verb();
 Verb evaluate_verb();
 Verb align_verb();
 Verb covariance_verb();
+Verb calibrate_verb();
 Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();

@@ -23,6 +23,14 @@ enum class Gauge : std::uint8_t {
   first_two,     ///< the first image's pose and the second one's distance from it are exact
 };
 
+/// How entries of the inverse are found.
+enum class CovarianceSolver : std::uint8_t {
+  automatic,  ///< factor; where that exceeds the memory limit and only a few images and points are
+              ///< named: conjugate_gradients
+  factor,     ///< all that the factor's pattern holds, at once
+  conjugate_gradients,  ///< a solve for each parameter that is asked for; images must be named
+};
+
 struct CovarianceOptions {
   Gauge gauge = Gauge::automatic;
   Fixed fixed{};  ///< as in the solve: what is held has no covariance
@@ -34,10 +42,17 @@ struct CovarianceOptions {
   bool conditional = false;  ///< of points with cameras held, and of nothing else
   /// Points to tell of, by index, where not all are wanted.
   std::vector<std::uint32_t> point_ids;
+  /// Images to tell of, by index, where not all are wanted.
+  std::vector<std::uint32_t> image_ids;
+  /// Pairs of images whose common covariance is told: one solve for each of their parameters.
+  std::vector<std::array<std::uint32_t, 2>> image_pairs;
+  /// Lenses together with the mean motion of their images, for projection_uncertainty.
+  bool lens_motions = false;
   bool points = true;                    ///< tell of points at all
   bool observations = false;             ///< redundancy numbers of observations
   int threads = 0;                       ///< 0: as many as the machine offers
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
+  CovarianceSolver solver = CovarianceSolver::automatic;
 };
 
 /// Row-major; of what is held or not determined every number is 0 or not finite, as said.
@@ -58,6 +73,12 @@ struct ObservationReliability {
   std::array<double, 2> standardised{};
 };
 
+/// Between the centres of two images, scene units. Without a known scale it is relative to what the
+/// gauge holds.
+struct Distance {
+  double value = 0, sigma = 0;
+};
+
 struct Covariance {
   Gauge gauge = Gauge::data;          ///< that was used
   int deficit = 0;                    ///< how many of the seven freedoms of a scene the data leaves
@@ -70,13 +91,21 @@ struct Covariance {
   double redundancy = 0;  ///< rows - unknowns + deficit
 
   /// Of a step (rho, phi) of cam_from_world, T' = exp([rho, phi]^) T: scene units and radians. Of
-  /// an image of a rig what its frame and its sensor make of it. Zero where an image is held.
+  /// an image of a rig what its frame and its sensor make of it. Zero where an image is held. Of
+  /// each image, or of image_ids in their order.
   std::vector<Covariance6> poses;
   std::vector<std::array<double, 9>> centres;  ///< of camera centres, world, scene units squared
   std::vector<Covariance6> frames;             ///< of rig_from_world, likewise; zero: trivial
   std::vector<Covariance6> sensors;            ///< of sensor_from_rig
-  /// Of each lens n x n with n its model's parameters; rows of held ones are zero.
+  /// Of each lens n x n with n its model's parameters; rows of held ones are zero. Empty of lenses
+  /// that were not asked for.
   std::vector<std::vector<double>> lenses;
+  /// Of each lens (n + 6) x (n + 6), its parameters and then the mean (rho, phi) of the images that
+  /// see something through it; empty where it was not asked for.
+  std::vector<std::vector<double>> lens_motions;
+  /// Of each of image_pairs: (rho, phi) of the first (rows) by those of the second.
+  std::vector<Covariance6> pairs;
+  std::vector<Distance> distances;  ///< of each of image_pairs
   /// Of each point, or of point_ids in their order; not finite where a point is not determined.
   std::vector<std::array<double, 9>> points;
   std::vector<ObservationReliability> observations;
@@ -84,6 +113,7 @@ struct Covariance {
   std::vector<WeakDirection> weak;  ///< by how far they are beyond the limits
   std::vector<std::string> words;   ///< sentences: gauge, sigma, what is not determined
   std::uint64_t undetermined_points = 0;
+  CovarianceSolver solver = CovarianceSolver::factor;  ///< that was used
   double seconds = 0;
 };
 
@@ -91,5 +121,32 @@ struct Covariance {
 /// Errors: usage for a problem that `validate` refuses, options that contradict it, a gauge that
 /// does not suit; memory_limit.
 Result<Covariance> covariance(const Problem& problem, const CovarianceOptions& options = {});
+
+/// Where on an image a lens's uncertainty is told of.
+struct ProjectionGrid {
+  std::uint32_t columns = 60, rows = 40;  ///< from edge to edge of the image, at least 2 each
+  double distance = 0;  ///< of the places that are seen, scene units; 0: infinitely far away
+};
+
+/// How far the pixel of a place that rests in the world moves as the lens and the images' poses,
+/// which go together, vary.
+struct ProjectionUncertainty {
+  ProjectionGrid grid;
+  std::vector<std::array<double, 2>> pixels;  ///< row by row
+  /// xx, xy and yy of each, px^2. Not a number where the lens sees no direction there.
+  std::vector<std::array<double, 3>> covariance;
+  /// The square root of the larger eigenvalue, px.
+  double worst_direction(std::size_t node) const;
+};
+
+/// The pixel of P in the camera's frame moves by J_lens dl + J_P (rho + phi x P), with dl the step
+/// of the lens and (rho, phi) the mean step of its images: with a board of points held the
+/// uncertainty that mrcal 2 states of a camera at the reference, where boards move by the inverse.
+/// lens_motion: (n + 6) x (n + 6), of Covariance::lens_motions.
+/// Errors: usage for a camera without an image size, a grid of fewer than two rows or columns, a
+/// matrix of another size.
+Result<ProjectionUncertainty> projection_uncertainty(const Camera& camera,
+                                                     const std::vector<double>& lens_motion,
+                                                     const ProjectionGrid& grid = {});
 
 }  // namespace sheaf

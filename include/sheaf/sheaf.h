@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sheaf/board.h"
 #include "sheaf/camera.h"
 #include "sheaf/covariance.h"
 #include "sheaf/error.h"

@@ -47,6 +47,17 @@ void choose_points(nb::handle points, CovarianceOptions& options) {
   options.points = !options.point_ids.empty();
 }
 
+/// None: all; else indices.
+void choose_images(nb::handle images, nb::handle pairs, CovarianceOptions& options) {
+  if (!images.is_none()) options.image_ids = indices_from(images, "images");
+  if (pairs.is_none()) return;
+  const nb::object array = nb::module_::import_("numpy").attr("asarray")(pairs);
+  const nb::object rows = array.attr("reshape")(-1, 2).attr("reshape")(-1);
+  const std::vector<std::uint32_t> ends = indices_from(rows, "pairs");
+  for (std::size_t k = 0; k < ends.size(); k += 2)
+    options.image_pairs.push_back({ends[k], ends[k + 1]});
+}
+
 /// Symmetric blocks of one size behind one another: (n, size, size).
 template <std::size_t kNumbers>
 nb::object blocks_of(const std::vector<std::array<double, kNumbers>>& blocks, std::size_t size) {
@@ -57,7 +68,8 @@ nb::object blocks_of(const std::vector<std::array<double, kNumbers>>& blocks, st
 nb::list lenses_of(const Problem& problem, const Covariance& c) {
   nb::list out;
   for (std::size_t k = 0; k < c.lenses.size(); ++k) {
-    const std::size_t n = parameter_count(problem.cameras[k].model);
+    // Empty where it was not asked for.
+    const std::size_t n = c.lenses[k].empty() ? 0 : parameter_count(problem.cameras[k].model);
     out.append(array_of(c.lenses[k], {n, n}));
   }
   return out;
@@ -78,6 +90,9 @@ nb::object object_of(const Problem& problem, const Covariance& c) {
     redundancy.insert(redundancy.end(), r.redundancy.begin(), r.redundancy.end());
     standardised.insert(standardised.end(), r.standardised.begin(), r.standardised.end());
   }
+  std::vector<double> distances;
+  for (const Distance& distance : c.distances)
+    distances.insert(distances.end(), {distance.value, distance.sigma});
   nb::dict out;
   out["gauge"] = to_string(c.gauge);
   out["deficit"] = c.deficit;
@@ -94,6 +109,8 @@ nb::object object_of(const Problem& problem, const Covariance& c) {
   out["sensors"] = blocks_of(c.sensors, 6);
   out["lenses"] = lenses_of(problem, c);
   out["points"] = blocks_of(c.points, 3);
+  out["pairs"] = blocks_of(c.pairs, 6);
+  out["distances"] = array_of(distances, {c.distances.size(), 2});
   out["observation_redundancy"] = array_of(redundancy, {c.observations.size(), 2});
   out["observation_standardised"] = array_of(standardised, {c.observations.size(), 2});
   out["weak"] = weak_of(c);
@@ -108,6 +125,9 @@ nb::object covariance_of(const ProblemHandle& held, const nb::kwargs& keywords) 
   const std::optional<Constraints> constraints =
       constraints_from(left.attr("pop")("constraints", nb::none()));
   CovarianceArguments arguments;
+  const nb::object images = left.attr("pop")("images", nb::none());
+  const nb::object pairs = left.attr("pop")("pairs", nb::none());
+  choose_images(images, pairs, arguments.options);
   choose_points(left.attr("pop")("points", nb::none()), arguments.options);
   take_options(left, options_of(arguments));
   check_all_taken(left, "covariance");
@@ -141,12 +161,16 @@ void bind_covariance(nb::module_& module) {
   CovarianceArguments fresh;
   const std::vector<BoundOption> options = options_of(fresh);
   const std::string signature = signature_of("covariance", "problem: Problem",
-                                             {"points: bool | numpy.typing.ArrayLike | None = None",
+                                             {"images: numpy.typing.ArrayLike | None = None",
+                                              "pairs: numpy.typing.ArrayLike | None = None",
+                                              "points: bool | numpy.typing.ArrayLike | None = None",
                                               "constraints: sheaf._records.ConstraintsLike = None"},
                                              options, "sheaf._records.Covariance");
   module.def("covariance", &covariance_of, nb::arg("problem"), nb::arg("options"),
              nb::sig(signature.c_str()),
              ("How well a state is known, which should be an optimum (docs/covariance.md).\n\n"
+              "  images: indices of the images to tell of; None: all\n"
+              "  pairs: (k, 2): pairs of images whose common covariance and distance are told\n"
               "  points: indices of the points to tell of; None: all; False: none\n"
               "  constraints: a survey that takes part, as in solve\n" +
               help_of(options))

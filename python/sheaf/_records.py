@@ -173,12 +173,15 @@ class Covariance:
     rows: int
     unknowns: int
     redundancy: float
-    poses: Floats  #: (n, 6, 6): of (rho, phi), T' = exp([rho, phi]^) T, scene units and radians
+    poses: Floats  #: (n, 6, 6): of (rho, phi), T' = exp([rho, phi]^) T, scene units and radians;
+    #: of all images, or of those asked for
     centres: Floats  #: (n, 3, 3): of camera centres, world
     frames: Floats  #: (frames, 6, 6): of rig_from_world
     sensors: Floats  #: (sensors, 6, 6): of sensor_from_rig
-    lenses: list[Floats]  #: of each lens p x p
+    lenses: list[Floats]  #: of each lens p x p; 0 x 0 where it was not asked for
     points: Floats  #: (m, 3, 3), or of those asked for; not finite: not determined
+    pairs: Floats  #: (k, 6, 6): (rho, phi) of a pair's first image (rows) by those of its second
+    distances: Floats  #: (k, 2): between their centres, and its sigma
     observation_redundancy: Floats  #: (k, 2), where asked for
     observation_standardised: Floats  #: (k, 2): Baarda's w
     weak: list[WeakDirection]

@@ -72,6 +72,14 @@ class Reports(unittest.TestCase):
         some = sheaf.covariance(start, points=[7, 3], gauge="first-two", fix=["k"])
         self.assertEqual(some.points.shape, (2, 3, 3))
         self.assertEqual(sheaf.covariance(start, points=False).points.shape, (0, 3, 3))
+        two = sheaf.covariance(
+            start, images=[5, 2], pairs=[[5, 2]], points=False, solver="conjugate-gradients",
+            gauge="first-two",
+        )
+        self.assertEqual((two.poses.shape, two.pairs.shape), ((2, 6, 6), (1, 6, 6)))
+        self.assertTrue(numpy.allclose(two.poses[0], told.poses[5], rtol=1e-4, atol=1e-12))
+        value, sigma = two.distances[0]
+        self.assertTrue(0 < sigma < value)
 
     @scenes.needs_command
     def test_covariance_is_the_commands(self):

@@ -8,185 +8,16 @@
 #include <new>
 
 #include "covariance/inverse_normal.h"
+#include "covariance/iterative_inverse.h"
+#include "covariance/joint_functions.h"
 #include "covariance/noise.h"
+#include "covariance/telling.h"
 #include "covariance/weak_directions.h"
 #include "platform/clock.h"
 #include "platform/real_text.h"
 
 namespace sheaf {
 namespace {
-
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-/// Fills a Covariance from the inverse, part by part.
-class Telling {
- public:
-  Telling(const Problem& problem, const CovarianceOptions& options, NormalEquations& equations,
-          const InverseNormal& inverse, Threads& threads, Covariance& out)
-      : problem_(problem),
-        options_(options),
-        equations_(equations),
-        inverse_(inverse),
-        threads_(threads),
-        blocks_(equations.blocks()),
-        variance_(out.sigma * out.sigma * out.loss_factor),
-        out_(out) {}
-
-  void run() {
-    tell_poses();
-    tell_lenses();
-    if (options_.points && !equations_.points_held()) tell_points();
-    if (options_.observations) tell_observations();
-  }
-
- private:
-  std::vector<double> identity(std::size_t n) const {
-    std::vector<double> out(n * n, 0);
-    for (std::size_t k = 0; k < n; ++k) out[(n + 1) * k] = 1;
-    return out;
-  }
-  /// Of parts whose columns are all determined; else infinite on the diagonal and 0 beside it.
-  std::vector<double> scaled(const std::vector<LinearPart>& parts, std::size_t rows) const {
-    std::vector<double> C = inverse_.of(parts, rows);
-    for (double& x : C) x *= variance_;
-    // What the gauge makes exact comes out as 0 to rounding, on either side of it.
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t j = 0; C[(rows + 1) * i] <= 0 && j < rows; ++j)
-        C[rows * i + j] = C[rows * j + i] = 0;
-    for (const LinearPart& part : parts)
-      for (std::size_t k = 0; k < blocks_.width(part.block); ++k) {
-        if (inverse_.determined(blocks_.first[part.block] + static_cast<std::int32_t>(k))) continue;
-        for (std::size_t i = 0; i < rows; ++i)
-          if (part.by[blocks_.width(part.block) * i + k] != 0)
-            for (std::size_t j = 0; j < rows; ++j)
-              C[rows * i + j] = C[rows * j + i] = i == j ? kInfinite : 0;
-      }
-    return C;
-  }
-  Covariance6 of_pose(const std::vector<LinearPart>& parts) const {
-    Covariance6 out{};
-    if (parts.empty()) return out;
-    const std::vector<double> C = scaled(parts, 6);
-    std::copy(C.begin(), C.end(), out.begin());
-    return out;
-  }
-  Covariance6 of_block(std::uint32_t block) const {
-    if (block == ParameterBlocks::kNone) return {};
-    return of_pose({{block, identity(6)}});
-  }
-
-  void tell_poses() {
-    for (std::size_t i = 0; i < problem_.num_images(); ++i) {
-      std::vector<LinearPart> parts;
-      for (const auto& pose : equations_.rows().pose_parts(i))
-        parts.push_back({pose.block, {pose.by_image.begin(), pose.by_image.end()}});
-      out_.poses.push_back(of_pose(parts));
-      // The centre moves by -R^T rho.
-      const Matrix3<double> R = matrix_from_quaternion(problem_.poses[i].rotation);
-      std::array<double, 9> C{};
-      for (std::size_t a = 0; a < 3; ++a)
-        for (std::size_t b = 0; b < 3; ++b)
-          for (std::size_t k = 0; k < 3; ++k)
-            for (std::size_t l = 0; l < 3; ++l)
-              C[3 * a + b] += R[3 * k + a] * out_.poses[i][6 * k + l] * R[3 * l + b];
-      out_.centres.push_back(C);
-    }
-    for (const std::uint32_t block : blocks_.frame) out_.frames.push_back(of_block(block));
-    for (const std::uint32_t block : blocks_.sensor) out_.sensors.push_back(of_block(block));
-  }
-
-  void tell_lenses() {
-    for (std::size_t c = 0; c < problem_.cameras.size(); ++c) {
-      const ParameterBlocks::Lens& lens = blocks_.lenses[c];
-      const std::size_t n = parameter_count(problem_.cameras[c].model);
-      const std::size_t free = lens.of_column.size();
-      std::vector<double>& C = out_.lenses.emplace_back(n * n, 0);
-      if (free == 0) continue;
-      std::vector<LinearPart> parts;
-      for (std::size_t at = 0; at < free; at += 9) {
-        const std::uint32_t block = lens.block + static_cast<std::uint32_t>(at / 9);
-        const std::size_t width = blocks_.width(block);
-        std::vector<double> by(free * width, 0);
-        for (std::size_t k = 0; k < width; ++k) by[width * (at + k) + k] = 1;
-        parts.push_back({block, std::move(by)});
-      }
-      const std::vector<double> of = scaled(parts, free);
-      for (std::size_t i = 0; i < free; ++i)
-        for (std::size_t j = 0; j < free; ++j)
-          C[n * static_cast<std::size_t>(lens.of_column[i]) +
-            static_cast<std::size_t>(lens.of_column[j])] = of[free * i + j];
-    }
-  }
-
-  void tell_points() {
-    const bool all = options_.point_ids.empty();
-    const std::size_t count = all ? problem_.num_points() : options_.point_ids.size();
-    out_.points.resize(count);
-    std::vector<std::uint8_t> lost(count, 0);
-    threads_.for_ranges(count, 256, [&](std::size_t k, std::size_t end) {
-      NormalEquations::Point point;
-      for (; k < end; ++k) {
-        const std::size_t p = all ? k : options_.point_ids[k];
-        const auto kept = std::lower_bound(blocks_.kept.begin(), blocks_.kept.end(), p);
-        if (kept != blocks_.kept.end() && *kept == p) {
-          const std::uint32_t block =
-              blocks_.kept_block[static_cast<std::size_t>(kept - blocks_.kept.begin())];
-          const std::vector<double> C = scaled({{block, identity(3)}}, 3);
-          std::copy(C.begin(), C.end(), out_.points[k].begin());
-          continue;
-        }
-        equations_.point(p, point);
-        if (!point.determined) {
-          out_.points[k].fill(kInfinite);
-          lost[k] = 1;
-          continue;
-        }
-        out_.points[k] =
-            options_.conditional ? point.inverse : inverse_.of(point, &problem_.points[3 * p]);
-        for (double& x : out_.points[k]) x *= variance_;
-      }
-    });
-    out_.undetermined_points =
-        static_cast<std::uint64_t>(std::count(lost.begin(), lost.end(), std::uint8_t(1)));
-  }
-
-  void tell_observations() {
-    out_.observations.resize(problem_.num_observations());
-    threads_.for_ranges(problem_.num_points(), 256, [&](std::size_t p, std::size_t end) {
-      NormalEquations::Point point;
-      ObservationRows::Row row;
-      for (; p < end; ++p) {
-        if (equations_.begin_of(p) == equations_.end_of(p)) continue;
-        equations_.point(p, point);
-        for (const std::uint64_t* i = equations_.begin_of(p); i != equations_.end_of(p); ++i) {
-          equations_.rows().evaluate(*i, row);
-          out_.observations[*i] = reliability(point, row);
-        }
-      }
-    });
-  }
-  ObservationReliability reliability(const NormalEquations::Point& point,
-                                     const ObservationRows::Row& row) const {
-    const double w = equations_.weight_of(row);
-    const std::array<double, 4> fit = inverse_.of_fit(point, row, equations_.points_held());
-    ObservationReliability out;
-    for (std::size_t r = 0; r < 2; ++r) {
-      out.redundancy[r] = std::clamp(1 - w * fit[3 * r], 0.0, 1.0);
-      const double root = std::sqrt(out.redundancy[r] * w);
-      out.standardised[r] = root > 0 ? w * row.r[r] / (out_.sigma * root) : 0;
-    }
-    return out;
-  }
-
-  const Problem& problem_;
-  const CovarianceOptions& options_;
-  NormalEquations& equations_;
-  const InverseNormal& inverse_;
-  Threads& threads_;
-  const ParameterBlocks& blocks_;
-  const double variance_;
-  Covariance& out_;
-};
 
 Result<void> check(const Problem& problem, const CovarianceOptions& options) {
   if (Result<void> valid = validate(problem); !valid.ok()) return valid;
@@ -198,12 +29,97 @@ Result<void> check(const Problem& problem, const CovarianceOptions& options) {
     if (p >= problem.num_points())
       return usage("point " + std::to_string(p) + " is not one of the " +
                    std::to_string(problem.num_points()) + " points");
+  const auto image_range = [&](std::uint32_t i) {
+    return usage("image " + std::to_string(i) + " is not one of the " +
+                 std::to_string(problem.num_images()) + " images");
+  };
+  for (const std::uint32_t i : options.image_ids)
+    if (i >= problem.num_images()) return image_range(i);
+  for (const std::array<std::uint32_t, 2>& pair : options.image_pairs)
+    for (const std::uint32_t i : pair)
+      if (i >= problem.num_images()) return image_range(i);
   if (options.loss.kind != LossKind::none && !(options.loss.scale_px > 0))
     return usage("a covariance needs the loss's scale as the solve ended with it");
   return {};
 }
 
-void add_words(const GaugeWeights& weights, const InverseNormal& inverse, Covariance& out) {
+/// Whether a few are named, each of which may be solved for.
+bool is_named(const CovarianceOptions& options) {
+  constexpr std::size_t kMany = 1000;
+  return !options.image_ids.empty() &&
+         options.image_ids.size() + options.point_ids.size() <= kMany &&
+         (!options.points || !options.point_ids.empty()) && !options.observations;
+}
+
+/// Entries of the inverse by one way or the other, and what is asked for from them.
+class Inverting {
+ public:
+  Inverting(const Problem& problem, const CovarianceOptions& options, NormalEquations& equations,
+            const SceneGauge& gauge, const GaugeWeights& weights, Threads& threads, Covariance& out)
+      : problem_(problem),
+        options_(options),
+        equations_(equations),
+        gauge_(gauge),
+        weights_(weights),
+        threads_(threads),
+        out_(out) {}
+
+  Result<void> run() {
+    const JointFunctions joint = joint_functions(problem_, equations_, options_);
+    if (options_.solver != CovarianceSolver::conjugate_gradients) {
+      const auto inverse =
+          InverseNormal::make(problem_, equations_, gauge_, weights_, joint.functions,
+                              options_.memory_limit_bytes, threads_);
+      if (inverse.ok()) {
+        tell(problem_, options_, equations_, *inverse.value(), inverse.value().get(), joint,
+             threads_, out_);
+        if (inverse.value()->ridged())
+          notes_.push_back("the measurements leave more undetermined than the scene's freedoms");
+        return {};
+      }
+      if (inverse.error().code() != ErrorCode::memory_limit ||
+          options_.solver == CovarianceSolver::factor || !is_named(options_))
+        return inverse.error();
+      notes_.push_back(std::string(inverse.error().what()) +
+                       ": what is named is solved for by conjugate gradients");
+    }
+    return iterate(joint);
+  }
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  Result<void> iterate(const JointFunctions& joint) {
+    if (!is_named(options_))
+      return Error(ErrorCode::usage,
+                   "conjugate gradients tell of a few images and points, which must be named, and "
+                   "not of observations");
+    if (!weights_.of_points.empty())
+      return Error(ErrorCode::usage,
+                   "the gauge free-points needs the factor: state another gauge for conjugate "
+                   "gradients");
+    const IterativeInverse inverse(equations_, gauge_, weights_, joint.functions, threads_);
+    tell(problem_, options_, equations_, inverse, nullptr, joint, threads_, out_);
+    out_.solver = CovarianceSolver::conjugate_gradients;
+    notes_.push_back("conjugate gradients took " + std::to_string(inverse.iterations()) +
+                     " iterations");
+    if (inverse.unfinished() > 0)
+      notes_.push_back(std::to_string(inverse.unfinished()) +
+                       " solves did not end: what they are of is told as infinite");
+    return {};
+  }
+
+  const Problem& problem_;
+  const CovarianceOptions& options_;
+  NormalEquations& equations_;
+  const SceneGauge& gauge_;
+  const GaugeWeights& weights_;
+  Threads& threads_;
+  Covariance& out_;
+  std::vector<std::string> notes_;
+};
+
+void add_words(const GaugeWeights& weights, const std::vector<std::string>& notes,
+               Covariance& out) {
   if (out.deficit == 0) {
     out.words.push_back("the data fix the scene's place, turn and scale: no gauge is added");
   } else {
@@ -217,8 +133,7 @@ void add_words(const GaugeWeights& weights, const InverseNormal& inverse, Covari
                       (out.sigma_estimated ? ", from the residuals (redundancy " +
                                                  few_digits(out.redundancy, 6) + ")"
                                            : ", as stated"));
-  if (inverse.ridged())
-    out.words.push_back("the measurements leave more undetermined than the scene's freedoms");
+  out.words.insert(out.words.end(), notes.begin(), notes.end());
   if (out.undetermined_points > 0)
     out.words.push_back(std::to_string(out.undetermined_points) +
                         " points are not determined by their observations");
@@ -266,12 +181,10 @@ Result<Covariance> covariance(const Problem& given, const CovarianceOptions& opt
     out.sigma_estimated = noise.estimated;
     out.loss_factor = noise.factor;
     out.redundancy = noise.redundancy;
-    const auto inverse = InverseNormal::make(*problem, equations, gauge, weights.value(),
-                                             options.memory_limit_bytes, threads);
-    if (!inverse.ok()) return inverse.error();
-    Telling(*problem, options, equations, *inverse.value(), threads, out).run();
+    Inverting inverting(*problem, options, equations, gauge, weights.value(), threads, out);
+    if (const Result<void> done = inverting.run(); !done.ok()) return done.error();
     out.weak = weak_directions(*problem, out.lenses);
-    add_words(weights.value(), *inverse.value(), out);
+    add_words(weights.value(), inverting.notes(), out);
     out.seconds = clock.seconds();
     return out;
   } catch (const std::bad_alloc&) {

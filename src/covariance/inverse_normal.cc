@@ -151,19 +151,74 @@ std::vector<double> InverseNormal::of_point_gauge(const NormalEquations::Point& 
   return out;
 }
 
-/// C - G M - (G M)^T + G N G^T; G: rows x d, M: d x rows.
-void InverseNormal::into_gauge(const double* G, const double* M, std::size_t rows,
-                               double* C) const {
+InverseNormal::InGauge InverseNormal::in_gauge(const LinearFunction& function) const {
+  const ParameterBlocks& blocks = equations_.blocks();
+  const std::size_t d = gauge_.count(), n = is_pinned_.size(), rows = function.rows;
+  InGauge out{std::vector<double>(rows * d, 0), std::vector<double>(d * rows, 0)};
+  for (const LinearPart& part : function.parts) {
+    const std::size_t width = blocks.width(part.block);
+    const auto first = static_cast<std::size_t>(blocks.first[part.block]);
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t k = 0; k < width; ++k)
+        for (std::size_t g = 0; g < d; ++g) {
+          out.G[d * i + g] += part.by[width * i + k] * gauge_.of_columns()[d * (first + k) + g];
+          out.M[rows * g + i] += part.by[width * i + k] * M_[n * g + first + k];
+        }
+  }
+  return out;
+}
+
+/// C - G_a M_b - (G_b M_a)^T + G_a N G_b^T, rows of a x rows of b.
+void InverseNormal::into_gauge(const InGauge& a, const InGauge& b, double* C) const {
   const std::size_t d = gauge_.count();
+  if (d == 0) return;
+  const std::size_t rows = a.G.size() / d, columns = b.G.size() / d;
   std::vector<double> GN(rows * d, 0);
   for (std::size_t i = 0; i < rows; ++i)
     for (std::size_t l = 0; l < d; ++l)
-      for (std::size_t k = 0; k < d; ++k) GN[d * i + l] += G[d * i + k] * N_[d * k + l];
+      for (std::size_t k = 0; k < d; ++k) GN[d * i + l] += a.G[d * i + k] * N_[d * k + l];
   for (std::size_t i = 0; i < rows; ++i)
-    for (std::size_t j = 0; j < rows; ++j)
+    for (std::size_t j = 0; j < columns; ++j)
       for (std::size_t k = 0; k < d; ++k)
-        C[rows * i + j] += GN[d * i + k] * G[d * j + k] - G[d * i + k] * M[rows * k + j] -
-                           M[rows * k + i] * G[d * j + k];
+        C[columns * i + j] += GN[d * i + k] * b.G[d * j + k] -
+                              a.G[d * i + k] * b.M[columns * k + j] -
+                              a.M[rows * k + i] * b.G[d * j + k];
+}
+
+void InverseNormal::solve_functions(SparseCholesky& cholesky) {
+  const ParameterBlocks& blocks = equations_.blocks();
+  const std::size_t n = is_pinned_.size();
+  for (const LinearFunction& function : functions_) {
+    std::vector<double>& X = solved_.emplace_back(n * function.rows, 0);
+    for (const LinearPart& part : function.parts)
+      for (std::size_t i = 0; i < function.rows; ++i)
+        for (std::size_t k = 0; k < blocks.width(part.block); ++k)
+          X[n * i + static_cast<std::size_t>(blocks.first[part.block]) + k] +=
+              part.by[blocks.width(part.block) * i + k];
+    for (std::size_t i = 0; i < function.rows; ++i) {
+      for (const std::int32_t c : pinned_) X[n * i + static_cast<std::size_t>(c)] = 0;
+      cholesky.solve(&X[n * i]);
+      for (const std::int32_t c : pinned_) X[n * i + static_cast<std::size_t>(c)] = 0;
+    }
+  }
+}
+
+std::vector<double> InverseNormal::across(std::size_t a, std::size_t b) const {
+  const ParameterBlocks& blocks = equations_.blocks();
+  const std::size_t n = is_pinned_.size();
+  const std::size_t rows = functions_[a].rows, columns = functions_[b].rows;
+  std::vector<double> C(rows * columns, 0);
+  for (const LinearPart& part : functions_[b].parts) {
+    const std::size_t width = blocks.width(part.block);
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t j = 0; j < columns; ++j)
+        for (std::size_t k = 0; k < width; ++k)
+          C[columns * i + j] +=
+              solved_[a][n * i + static_cast<std::size_t>(blocks.first[part.block]) + k] *
+              part.by[width * j + k];
+  }
+  into_gauge(in_gauge(functions_[a]), in_gauge(functions_[b]), C.data());
+  return C;
 }
 
 void InverseNormal::take_inverse(const SparseCholesky& cholesky) {
@@ -195,8 +250,10 @@ void InverseNormal::take_inverse(const SparseCholesky& cholesky) {
 
 Result<std::unique_ptr<InverseNormal>> InverseNormal::make(
     const Problem& problem, NormalEquations& equations, const SceneGauge& gauge,
-    const GaugeWeights& weights, std::uint64_t memory_limit_bytes, Threads& threads) {
+    const GaugeWeights& weights, std::vector<LinearFunction> functions,
+    std::uint64_t memory_limit_bytes, Threads& threads) {
   std::unique_ptr<InverseNormal> out(new InverseNormal(equations, gauge));
+  out->functions_ = std::move(functions);
   const ParameterBlocks& blocks = equations.blocks();
   const auto n = static_cast<std::size_t>(blocks.columns());
   out->is_pinned_.assign(n, 0);
@@ -226,26 +283,19 @@ Result<std::unique_ptr<InverseNormal>> InverseNormal::make(
           "numbers are not finite");
   }
   out->solve_gauge(problem, weights, cholesky);
+  out->solve_functions(cholesky);
   cholesky.invert(threads);
   out->take_inverse(cholesky);
   return out;
 }
 
-std::vector<double> InverseNormal::of(const std::vector<LinearPart>& parts,
-                                      std::size_t rows) const {
+std::vector<double> InverseNormal::of(const LinearFunction& function) const {
   const ParameterBlocks& blocks = equations_.blocks();
-  const std::size_t d = gauge_.count(), n = is_pinned_.size();
-  std::vector<double> C(rows * rows, 0), G(rows * d, 0), M(d * rows, 0), half;
-  for (const LinearPart& a : parts) {
+  const std::size_t rows = function.rows;
+  std::vector<double> C(rows * rows, 0), half;
+  for (const LinearPart& a : function.parts) {
     const std::size_t wa = blocks.width(a.block);
-    const auto first = static_cast<std::size_t>(blocks.first[a.block]);
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t k = 0; k < wa; ++k)
-        for (std::size_t g = 0; g < d; ++g) {
-          G[d * i + g] += a.by[wa * i + k] * gauge_.of_columns()[d * (first + k) + g];
-          M[rows * g + i] += a.by[wa * i + k] * M_[n * g + first + k];
-        }
-    for (const LinearPart& b : parts) {
+    for (const LinearPart& b : function.parts) {
       const std::size_t wb = blocks.width(b.block);
       bool transposed = false;
       const double* Z = tile(a.block, b.block, transposed);
@@ -260,7 +310,8 @@ std::vector<double> InverseNormal::of(const std::vector<LinearPart>& parts,
             C[rows * i + j] += half[wb * i + l] * b.by[wb * j + l];
     }
   }
-  into_gauge(G.data(), M.data(), rows, C.data());
+  const InGauge own = in_gauge(function);
+  into_gauge(own, own, C.data());
   return C;
 }
 
@@ -301,9 +352,9 @@ std::array<double, 9> InverseNormal::of(const NormalEquations::Point& point,
       for (std::size_t l = 0; l < 3; ++l)
         out[3 * i + k] += half[3 * i + l] * point.inverse[3 * l + k];
   if (gauge_.count() == 0) return out;
-  std::vector<double> G(3 * gauge_.count());
-  gauge_.of_point(X, G.data());
-  into_gauge(G.data(), of_point_gauge(point, X).data(), 3, out.data());
+  InGauge own{std::vector<double>(3 * gauge_.count()), of_point_gauge(point, X)};
+  gauge_.of_point(X, own.G.data());
+  into_gauge(own, own, out.data());
   return out;
 }
 

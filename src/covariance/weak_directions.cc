@@ -125,7 +125,7 @@ std::vector<WeakDirection> weak_directions(const Problem& problem,
   const std::vector<Reach> reach = reach_of(problem);
   std::vector<std::pair<double, WeakDirection>> found;
   for (std::uint32_t c = 0; c < lenses.size(); ++c)
-    LensWeakness(problem.cameras[c], c, lenses[c], reach[c]).find(found);
+    if (!lenses[c].empty()) LensWeakness(problem.cameras[c], c, lenses[c], reach[c]).find(found);
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<WeakDirection> out;

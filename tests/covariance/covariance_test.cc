@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -176,6 +178,118 @@ TEST(Covariance, IsTheDenseInverseWithTheTraceOverPoints) {
   expect_book(unrigged(CameraModel::opencv), {}, {}, Gauge::free_points);
 }
 
+/// What is told of single images, of two at once and by single solves, against the book.
+TEST(Covariance, IsTheDenseInverseAcrossImages) {
+  Problem one = unrigged(CameraModel::opencv);
+  one.terms.distances.push_back({7, 9, 1.3, 0.01, {}});
+  for (const Problem& start : {unrigged(CameraModel::opencv), one}) {
+    const Problem p = solved(start);
+    const Book book = by_the_book(p, {}, {}, is_centre);
+    for (const CovarianceSolver solver :
+         {CovarianceSolver::factor, CovarianceSolver::conjugate_gradients}) {
+      CovarianceOptions options;
+      options.solver = solver;
+      options.image_ids = {4, 1};
+      options.point_ids = {2, 7};
+      options.image_pairs = {{1, 4}, {2, 5}};
+      options.threads = 2;
+      const Covariance c = covariance(p, options).value();
+      EXPECT_EQ(c.solver, solver);
+      const double variance = c.sigma * c.sigma;
+      const auto block = [&](Kind kind, std::uint32_t a, std::uint32_t b, Eigen::Index n) {
+        return Eigen::MatrixXd(variance *
+                               book.C.block(book.first(kind, a), book.first(kind, b), n, n));
+      };
+      ASSERT_EQ(c.poses.size(), 2u);
+      EXPECT_LT(off(c.poses[0], block(Kind::image, 4, 4, 6)), 1e-7);
+      EXPECT_LT(off(c.poses[1], block(Kind::image, 1, 1, 6)), 1e-7);
+      ASSERT_EQ(c.points.size(), 2u);
+      EXPECT_LT(off(c.points[0], block(Kind::point, 2, 2, 3)), 1e-7);
+      EXPECT_LT(off(c.points[1], block(Kind::point, 7, 7, 3)), 1e-7);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const auto [a, b] = options.image_pairs[k];
+        const Eigen::MatrixXd C = block(Kind::image, a, b, 6), Ca = block(Kind::image, a, a, 6),
+                              Cb = block(Kind::image, b, b, 6);
+        for (Eigen::Index i = 0; i < 6; ++i)
+          for (Eigen::Index j = 0; j < 6; ++j)
+            EXPECT_NEAR(c.pairs[k][static_cast<std::size_t>(6 * i + j)], C(i, j),
+                        1e-7 * std::sqrt(Ca(i, i) * Cb(j, j)));
+      }
+      // The distance of two images by differences of the centres that steps of their poses move.
+      const auto distance = [&](const Problem& q) {
+        std::array<Vector3<double>, 2> at{};
+        for (std::size_t e = 0; e < 2; ++e) {
+          const Pose& pose = q.poses[options.image_pairs[0][e]];
+          const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+          for (std::size_t k = 0; k < 3; ++k)
+            for (std::size_t r = 0; r < 3; ++r) at[e][k] -= R[3 * r + k] * pose.translation[r];
+        }
+        return std::hypot(at[0][0] - at[1][0], at[0][1] - at[1][1], at[0][2] - at[1][2]);
+      };
+      Eigen::VectorXd by = Eigen::VectorXd::Zero(book.C.rows());
+      for (Eigen::Index u = 0; u < by.size(); ++u) {
+        const Unknown& unknown = book.unknowns[static_cast<std::size_t>(u)];
+        if (unknown.kind != Kind::image) continue;
+        Problem more = p, less = p;
+        test::move(more, unknown, 1e-6), test::move(less, unknown, -1e-6);
+        by[u] = (distance(more) - distance(less)) / 2e-6;
+      }
+      EXPECT_NEAR(c.distances[0].value, distance(p), 1e-12);
+      EXPECT_NEAR(c.distances[0].sigma, std::sqrt(variance * by.dot(book.C * by)),
+                  1e-6 * c.distances[0].sigma);
+    }
+  }
+}
+
+/// A lens and the mean motion of its images, of rigs too: by the book.
+TEST(Covariance, IsTheDenseInverseOfLensesWithTheirImages) {
+  const Problem p = solved(unrigged(CameraModel::opencv));
+  const Book book = by_the_book(p, {}, {}, is_centre);
+  CovarianceOptions options;
+  options.lens_motions = true;
+  const Covariance c = covariance(p, options).value();
+  for (std::uint32_t k = 0; k < p.cameras.size(); ++k) {
+    const std::size_t n = parameter_count(p.cameras[k].model), all = n + 6;
+    const auto images =
+        static_cast<double>(std::count(p.image_camera.begin(), p.image_camera.end(), k));
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(all), book.C.rows());
+    for (Eigen::Index u = 0; u < book.C.rows(); ++u) {
+      const Unknown& of = book.unknowns[static_cast<std::size_t>(u)];
+      if (of.kind == Kind::lens && of.index == k) A(of.part, u) = 1;
+      if (of.kind == Kind::image && p.image_camera[of.index] == k)
+        A(static_cast<Eigen::Index>(n) + of.part, u) = 1 / images;
+    }
+    const Eigen::MatrixXd C = c.sigma * c.sigma * A * book.C * A.transpose();
+    const Eigen::VectorXd s = C.diagonal().cwiseSqrt();
+    ASSERT_EQ(c.lens_motions[k].size(), all * all);
+    for (Eigen::Index i = 0; i < C.rows(); ++i)
+      for (Eigen::Index j = 0; j < C.rows(); ++j)
+        EXPECT_NEAR(
+            c.lens_motions[k][all * static_cast<std::size_t>(i) + static_cast<std::size_t>(j)],
+            C(i, j), 1e-7 * s[i] * s[j]);
+  }
+}
+
+TEST(Covariance, ASmallLimitLeavesWhatIsNamed) {
+  const Problem p = solved(scene(CameraModel::opencv));
+  CovarianceOptions options;
+  options.memory_limit_bytes = 1;
+  EXPECT_EQ(covariance(p, options).error().code(), ErrorCode::memory_limit);
+  options.image_ids = {0, 3};
+  options.points = false;
+  const Covariance few = covariance(p, options).value();
+  EXPECT_EQ(few.solver, CovarianceSolver::conjugate_gradients);
+  options.memory_limit_bytes = 0;
+  const Covariance all = covariance(p, options).value();
+  EXPECT_EQ(all.solver, CovarianceSolver::factor);
+  for (std::size_t k = 0; k < 2; ++k)
+    for (std::size_t i = 0; i < 36; ++i)
+      EXPECT_NEAR(few.poses[k][i], all.poses[k][i],
+                  1e-7 * std::sqrt(all.poses[k][7 * (i / 6)] * all.poses[k][7 * (i % 6)]));
+  const std::uint32_t frame = p.rigs.image_frame[0];
+  EXPECT_NEAR(few.frames[frame][0], all.frames[frame][0], 1e-7 * all.frames[frame][0]);
+}
+
 TEST(Covariance, RedundancyNumbersAddUp) {
   const Problem p = solved(unrigged(CameraModel::opencv));
   for (const Gauge gauge : {Gauge::free_centres, Gauge::free_points, Gauge::first_two}) {
@@ -231,7 +345,13 @@ TEST(Covariance, WhatMakesNoSenseIsRefused) {
     const Result<Covariance> c = covariance(p, options);
     return c.ok() ? std::string() : std::string(c.error().what());
   };
-  CovarianceOptions data, sigma, ids, loss;
+  CovarianceOptions data, sigma, ids, loss, images, unnamed, traced;
+  images.image_ids = {999};
+  unnamed.solver = traced.solver = CovarianceSolver::conjugate_gradients;
+  traced.image_ids = {0}, traced.points = false, traced.gauge = Gauge::free_points;
+  EXPECT_NE(words(images).find("image 999"), std::string::npos);
+  EXPECT_NE(words(unnamed).find("must be named"), std::string::npos);
+  EXPECT_NE(words(traced).find("free-points"), std::string::npos);
   data.gauge = Gauge::data;
   sigma.sigma = -1;
   ids.point_ids = {999};

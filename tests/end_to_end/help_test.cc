@@ -93,7 +93,12 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "solve" || verb == "align") options.insert("--residuals");
   if (verb == "covariance")
     options.insert({"--gauge", "--sigma", "--loss", "--conditional", "--observations", "--points",
-                    "--memory-limit", "--csv", "--fix", "--refine", "--rigs", "--constraints"});
+                    "--memory-limit", "--csv", "--fix", "--refine", "--rigs", "--constraints",
+                    "--poses", "--pairs", "--solver"});
+  if (verb == "covariance" || verb == "calibrate")
+    options.insert({"--projection", "--projection-figure", "--distance", "--grid"});
+  if (verb == "calibrate")
+    options.insert({"--board", "--spacing", "--size", "--camera", "--focal", "--loss", "--output"});
   if (verb == "solve") options.insert("--sigmas");
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
@@ -146,6 +151,7 @@ TEST_P(Help, ExampleRuns) {
   TemporaryFolder folder;
   ASSERT_EQ(run_command({"generate", "problem.txt", "--points", "300"}, folder.path()).exit_code,
             0);
+  std::filesystem::copy_file("tests/data/board_corners.vnl", folder / "corners.vnl");
   if (std::string(GetParam()) == "photometric") {
     ASSERT_EQ(run_command({"generate", "scene", "--photometric", "--points", "200"}, folder.path())
                   .exit_code,
@@ -164,7 +170,8 @@ TEST_P(Help, ExampleRuns) {
 
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
-                                         "align", "covariance", "photometric", "generate", "demo"),
+                                         "align", "covariance", "calibrate", "photometric",
+                                         "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
@@ -172,7 +179,7 @@ TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
   for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "align",
-                           "covariance", "compare", "photometric", "generate", "demo"})
+                           "covariance", "calibrate", "compare", "photometric", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

@@ -182,6 +182,40 @@ TEST_F(JsonTest, CovarianceHasTheDocumentedKeys) {
   expect_documented("covariance", {kShared, "covariance"});
 }
 
+TEST_F(JsonTest, CovarianceHasWhatIsAskedFor) {
+  const std::string corners = std::filesystem::absolute("tests/data/board_corners.vnl");
+  ASSERT_EQ(run({"calibrate", corners, "--board", "6x5", "--spacing", "0.14", "--size", "1600x1200",
+                 "--distance", "2", "--projection", "sigmas.csv", "--projection-figure",
+                 "sigmas.svg", "--json", "calibrate.json", "-o", "lens/"})
+                .exit_code,
+            0);
+  const json calibration = json_of(folder_ / "calibrate.json");
+  std::set<std::string> keys = documented("covariance");
+  keys.merge(documented("calibrate"));
+  for (const std::string& key : produced(calibration)) {  // of a list that the page has as a whole
+    const std::string list = key.substr(0, key.find("[]"));
+    EXPECT_TRUE(keys.contains(key) || keys.contains(list) ||
+                keys.lower_bound(list + "[]")->starts_with(list + "[]"))
+        << key;
+  }
+  const json projection = calibration["projection"];
+  ASSERT_EQ(projection.size(), 2u);
+  EXPECT_TRUE(projection[0]["distance"].is_null());
+  EXPECT_EQ(projection[1]["distance"], 2);
+  EXPECT_NEAR(projection[0]["sigma_px"]["min"], 0.59, 0.01);
+  for (const char* name : {"sigmas.csv", "sigmas-0-far.svg", "sigmas-0-near.svg"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
+  // A calibration that was written says the same again.
+  ASSERT_EQ(run({"covariance", "lens", "--fix", "points", "--refine", "pp", "--sigma", "0.283883",
+                 "--projection", "again.csv", "--json", "again.json"})
+                .exit_code,
+            0);
+  EXPECT_NEAR(json_of(folder_ / "again.json")["projection"][0]["sigma_px"]["min"], 0.59, 0.03);
+  ASSERT_EQ(run({"covariance", "in.txt", "--json", "pairs.json", "--pairs", "0,1"}).exit_code, 0);
+  for (const char* key : {"images", "covariance", "distance", "distance_sigma"})
+    EXPECT_TRUE(json_of(folder_ / "pairs.json")["pairs"][0].contains(key)) << key;
+}
+
 TEST_F(JsonTest, CompareHasTheDocumentedKeys) {
   ASSERT_EQ(run({"compare", "in.txt", "--json", "compare.json", "--solvers", "sheaf,nobody",
                  "--reference", "in.txt"})
