@@ -5,6 +5,7 @@
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -43,6 +44,27 @@ class Package(unittest.TestCase):
         self.assertEqual(missing.returncode, 3)
         self.assertIn("sheaf solve: /no/such/file: found", missing.stderr)
 
+    def test_the_command_is_interrupted_as_a_command(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene, out = pathlib.Path(folder) / "scene.txt", pathlib.Path(folder) / "out.txt"
+            scenes.long().write(scene)
+            words = ["solve", scene, "-o", out, "--simd", "scalar", "--threads", "1"]
+            words += ["--tolerance", "0", "--inner-iterations", "60"]
+            running = subprocess.Popen(
+                [sys.executable, "-m", "sheaf", *map(str, words)],
+                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            )
+            with running, running.stderr:
+                running.stderr.readline()  # What it is solved by: the solve has begun.
+                running.send_signal(signal.SIGINT)
+                rest = running.stderr.read()
+            self.assertEqual(running.returncode, 130, rest)
+            self.assertEqual(sheaf.read(out).num_images, 60)
+
+    def test_version_is_that_of_the_build(self):
+        project = (scenes.ROOT / "pyproject.toml").read_text()
+        self.assertEqual(re.search(r'^version = "(.*)"', project, re.M).group(1), sheaf.__version__)
+
     def test_types(self):
         if run_python("-c", "import mypy").returncode != 0:
             self.skipTest("mypy is not installed")
@@ -65,7 +87,8 @@ class Package(unittest.TestCase):
                 scenes.street()[0].write(f"{folder}/model", format="colmap")
                 program = pathlib.Path(folder) / "program.py"
                 program.write_text("\n".join(blocks))
-                ran = run_python(program, cwd=folder)
+                env = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+                ran = run_python(program, cwd=folder, env=env)
                 self.assertEqual(ran.returncode, 0, f"{page}\n{ran.stdout}{ran.stderr}")
 
 
