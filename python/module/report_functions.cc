@@ -125,7 +125,9 @@ nb::object align_problem(const ProblemHandle& held, nb::handle reference, nb::ha
     throw Error(ErrorCode::usage, "onto what? reference or constraints");
   if (!reference.is_none()) {
     if (to != "all") throw Error(ErrorCode::usage, "to is for constraints");
-    return align_to_model(held, nb::cast<ProblemHandle>(reference), rigid, least_squares);
+    ProblemHandle onto = nb::cast<ProblemHandle>(reference);
+    if (onto.get() == held.get()) onto = handle_of(held->problem);  // it is about to move
+    return align_to_model(held, onto, rigid, least_squares);
   }
   if (least_squares) throw Error(ErrorCode::usage, "least_squares is for reference");
   return align_to_survey(held, *constraints_from(constraints), to, rigid);

@@ -53,6 +53,7 @@ class Reports(unittest.TestCase):
         self.assertTrue(numpy.allclose(moved.center, errors.center, atol=1e-9))
         with self.assertRaisesRegex(sheaf.Error, "onto what"):
             sheaf.align(start)
+        self.assertAlmostEqual(sheaf.align(start, start).similarity.scale, 1, places=12)
         self.assertEqual([f.code for f in sheaf.check(start) if f.grave], [])
         weak, _ = scenes.small()
         weak.observation_image[:] = weak.observation_image % 4
