@@ -39,12 +39,12 @@ def ellipse(place, covariance, enlarged, **style):
 figure, axes = pyplot.subplots(figsize=(7, 7))
 for place, covariance in zip(problem.points, told.points):
     if numpy.isfinite(covariance).all():
-        axes.add_patch(ellipse(place, covariance, 5, color="tab:blue", linewidth=0.5))
+        axes.add_patch(ellipse(place, covariance, 1, color="tab:blue", linewidth=0.5))
 for place, covariance in zip(centres, told.centres):
     axes.add_patch(ellipse(place, covariance, 5, color="tab:red"))
 axes.plot(*centres[:, :2].T, "r.", label="cameras")
 axes.plot(*problem.points[:, :2].T, "b.", markersize=1, label="points")
-axes.set(title="three sigmas, five times as large", aspect="equal")
+axes.set(title="three sigmas, those of cameras five times as large", aspect="equal")
 axes.legend()
 figure.savefig("covariances.png", dpi=120)
 print("wrote covariances.png")

@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -46,6 +47,42 @@ class FolderUse {
  private:
   HeldFolder& folder_;
 };
+
+/// Grey levels of an array (height, width) of any numbers that a float holds well enough.
+GreyImage image_from(nb::handle given, std::size_t i) {
+  const nb::object array =
+      nb::module_::import_("numpy").attr("ascontiguousarray")(given, nb::arg("dtype") = "float32");
+  const auto grey = nb::cast<nb::ndarray<const float, nb::device::cpu, nb::c_contig>>(array);
+  if (grey.ndim() != 2)
+    throw Error(ErrorCode::usage, "images[" + std::to_string(i) + "]: found " +
+                                      std::to_string(grey.ndim()) +
+                                      " dimensions, expected (height, width)");
+  GreyImage out;
+  out.height = static_cast<int>(grey.shape(0));
+  out.width = static_cast<int>(grey.shape(1));
+  out.pixels.assign(grey.data(), grey.data() + grey.size());
+  return out;
+}
+
+void construct(HeldFolder* self, nb::handle images, nb::handle camera, nb::handle poses,
+               nb::handle points, nb::handle host, nb::handle host_xy) {
+  PhotometricProblem p;
+  for (nb::handle image : nb::borrow<nb::object>(images))
+    p.images.push_back(image_from(image, p.images.size()));
+  const std::vector<double> pinhole = reals_from(camera, "camera", 1);
+  if (pinhole.size() != 4)
+    throw Error(ErrorCode::usage, "camera: found " + std::to_string(pinhole.size()) +
+                                      " numbers, expected fx, fy, cx, cy");
+  p.camera = {pinhole[0], pinhole[1], pinhole[2], pinhole[3]};
+  p.poses = poses_from(poses, "poses");
+  p.points = reals_from(points, "points", 3);
+  p.host = indices_from(host, "host");
+  p.host_xy = reals_from(host_xy, "host_xy", 2);
+  validate(p).value();
+  new (self) HeldFolder();
+  self->problem = std::move(p);
+  self->format = "direct";
+}
 
 FolderHandle held(PhotometricFolder folder) {
   auto out = std::make_shared<HeldFolder>();
@@ -162,7 +199,50 @@ void write_folder(const FolderHandle& folder, const fs::path& path) {
 void bind_folder(nb::module_& module) {
   nb::class_<HeldFolder>(
       module, "PhotometricFolder",
-      "Images with their poses, and points with their grey patches (docs/photometric.md).")
+      "Images with their poses, and points with their grey patches (docs/photometric.md).\n\n"
+      "  images: of each (height, width): grey levels, 0 to 255\n"
+      "  camera: fx, fy, cx, cy of all, pixels; (0, 0) is the centre of the first one\n"
+      "  poses: (n, 7): qw qx qy qz tx ty tz, cam_from_world, looking along +z\n"
+      "  points: (m, 3), host: (m,), host_xy: (m, 2): each on the ray of a pixel of its host, the "
+      "image that its patch is taken from")
+      .def("__init__", &construct, nb::arg("images"), nb::arg("camera"), nb::arg("poses"),
+           nb::arg("points"), nb::arg("host"), nb::arg("host_xy"),
+           nb::sig("def __init__(self, images: "
+                   "collections.abc.Sequence[numpy.typing.NDArray[typing.Any]], camera: "
+                   "numpy.typing.ArrayLike, poses: numpy.typing.ArrayLike, points: "
+                   "numpy.typing.ArrayLike, host: numpy.typing.ArrayLike, host_xy: "
+                   "numpy.typing.ArrayLike) -> None"))
+      .def_prop_ro(
+          "host", [](const HeldFolder& f) { return array_of(f.problem.host); },
+          nb::sig("def host(self) -> numpy.typing.NDArray[numpy.uint32]"),
+          "(m,): the image that each point's patch is taken from; empty where patches are stored.")
+      .def_prop_ro(
+          "host_xy",
+          [](const HeldFolder& f) {
+            return array_of(f.problem.host_xy, {f.problem.host.size(), 2});
+          },
+          nb::sig("def host_xy(self) -> numpy.typing.NDArray[numpy.float64]"),
+          "(m, 2): where, pixels; a copy.")
+      .def_prop_ro(
+          "camera",
+          [](const HeldFolder& f) {
+            const Pinhole& c = f.problem.camera;
+            return nb::make_tuple(c.fx, c.fy, c.cx, c.cy);
+          },
+          nb::sig("def camera(self) -> tuple[float, float, float, float]"),
+          "fx, fy, cx, cy of all images, pixels.")
+      .def(
+          "image",
+          [](const HeldFolder& f, std::size_t i) {
+            if (i >= f.problem.images.size()) throw nb::index_error("no such image");
+            const GreyImage& grey = f.problem.images[i];
+            const std::vector<double> levels(grey.pixels.begin(), grey.pixels.end());
+            return array_of(levels, {static_cast<std::size_t>(grey.height),
+                                     static_cast<std::size_t>(grey.width)});
+          },
+          nb::arg("index"),
+          nb::sig("def image(self, index: int) -> numpy.typing.NDArray[numpy.float64]"),
+          "(height, width): grey levels; a copy.")
       .def_prop_ro("poses", &poses_of,
                    nb::sig("def poses(self) -> numpy.typing.NDArray[numpy.float64]"),
                    "(n, 7): qw qx qy qz tx ty tz, cam_from_world; a copy.")

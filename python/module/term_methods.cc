@@ -150,6 +150,33 @@ void add_distance_prior(const ProblemHandle& held, std::uint32_t first, std::uin
       DistancePrior{first, second, distance, sigma, loss_from(loss)});
 }
 
+/// Blocks: (kind, index, state).
+GaussianPrior::Block block_from(nb::handle given) {
+  using Kind = GaussianPrior::Block::Kind;
+  const auto parts = nb::cast<nb::sequence>(given);
+  if (nb::len(parts) != 3)
+    throw Error(ErrorCode::usage, "blocks: expected (kind, index, state) of each");
+  const auto kind = nb::cast<std::string>(nb::object(parts[0]));
+  if (kind != "pose" && kind != "camera" && kind != "point")
+    throw Error(ErrorCode::usage, "blocks: expected pose, camera or point, not '" + kind + "'");
+  return {kind == "pose"     ? Kind::pose
+          : kind == "camera" ? Kind::camera
+                             : Kind::point,
+          nb::cast<std::uint32_t>(nb::object(parts[1])),
+          reals_from(nb::object(parts[2]), "state", 1)};
+}
+
+void add_gaussian_prior(const ProblemHandle& held, nb::handle blocks, nb::handle square_root,
+                        nb::handle mean, const std::string& loss) {
+  GaussianPrior prior;
+  for (nb::handle block : nb::borrow<nb::object>(blocks)) prior.blocks.push_back(block_from(block));
+  const nb::object S = nb::module_::import_("numpy").attr("asarray")(square_root);
+  prior.square_root = reals_from(S.attr("reshape")(-1), "square_root", 1);
+  if (!mean.is_none()) prior.mean = reals_from(mean, "mean", 1);
+  prior.loss = loss_from(loss);
+  add(held, held->problem.terms.gaussians, std::move(prior));
+}
+
 nb::dict counts_of(const HeldProblem& held) {
   const Terms& terms = held.problem.terms;
   nb::dict out;
@@ -226,6 +253,16 @@ void bind_lens_and_point_priors(ProblemClass& problem) {
            nb::arg("distance"), nb::arg("sigma"), nb::kw_only(), nb::arg("loss") = "none",
            "The distance between two points was measured, scene units. Few: both points become "
            "columns of the camera system.")
+      .def(
+          "add_gaussian_prior", &add_gaussian_prior, nb::arg("blocks"), nb::arg("square_root"),
+          nb::arg("mean") = nb::none(), nb::kw_only(), nb::arg("loss") = "none",
+          nb::sig("def add_gaussian_prior(self, blocks: "
+                  "collections.abc.Sequence[tuple[str, int, " SHEAF_ARRAY
+                  "]], square_root: " SHEAF_ARRAY ", mean: " SHEAF_ARRAY
+                  " | None = None, *, loss: str = 'none') -> None"),
+          "A Gaussian over several blocks at once, such as marginalisation leaves: cost "
+          "1/2 |S (d - mean)|^2, d the blocks' differences from their states, stacked. Blocks: "
+          "(kind, index, state): 'pose' (7 numbers), 'camera' (its parameters), 'point' (X, Y, Z).")
       .def(
           "clear_priors",
           [](const ProblemHandle& held) {

@@ -147,16 +147,18 @@ class Priors(unittest.TestCase):
         start.add_parameter_prior(3, "f", 900.0, 1.0)
         start.add_point_prior(4, [0, 0, 0], sigma=1.0)
         start.add_distance_prior(1, 2, 100.0, 0.1)
+        start.add_gaussian_prior(
+            [("pose", 5, start.poses[6]), ("point", 9, [0, 0, 0])], numpy.eye(9), numpy.zeros(9)
+        )
         start.add_parameter_bound(0, "k1", lower=-1, upper=1)
         self.assertEqual(
             start.priors,
             {"centres": 1, "rotations": 1, "gravities": 1, "relative_poses": 1, "parameters": 1,
-             "points": 1, "distances": 1, "gaussians": 0, "bounds": 1},
+             "points": 1, "distances": 1, "gaussians": 1, "bounds": 1},
         )
         self.assertGreater(start.evaluate().cost, plain)
         summary = sheaf.solve(start, max_iterations=30)
-        self.assertTrue(all(summary.initial_terms[k] > 0 for k in summary.initial_terms
-                            if k != "gaussians"))
+        self.assertTrue(all(cost > 0 for cost in summary.initial_terms.values()))
         self.assertLess(summary.final_terms["distances"], summary.initial_terms["distances"])
         self.assertAlmostEqual(start.evaluate().cost / summary.final_cost, 1, places=9)
         start.clear_priors()
@@ -199,6 +201,19 @@ class Photometric(unittest.TestCase):
             self.assertEqual((read.format, read.num_images), ("direct", 3))
         with self.assertRaisesRegex(sheaf.Error, "levels"):
             sheaf.photometric(start, levels=0)
+
+    def test_arrays_are_the_folder(self):
+        start, _ = sheaf.generate_photometric(cameras=3, points=300, seed=3)
+        built = sheaf.PhotometricFolder(
+            [start.image(i).astype("f4") for i in range(3)],
+            start.camera, start.poses, start.points, start.host, start.host_xy,
+        )
+        ends = [sheaf.photometric(f, max_iterations=5).solve.final_cost for f in (start, built)]
+        self.assertEqual(*ends)
+        with self.assertRaisesRegex(sheaf.Error, "expected fx, fy, cx, cy"):
+            sheaf.PhotometricFolder(
+                [start.image(0)], [1.0], start.poses, start.points, start.host, start.host_xy
+            )
 
 
 if __name__ == "__main__":
