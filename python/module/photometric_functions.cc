@@ -196,22 +196,30 @@ void write_folder(const FolderHandle& folder, const fs::path& path) {
   write_photometric(*folder, path).value();
 }
 
-void bind_folder(nb::module_& module) {
-  nb::class_<HeldFolder>(
+using FolderClass = nb::class_<HeldFolder>;
+
+FolderClass bind_folder(nb::module_& module) {
+  FolderClass folder(
       module, "PhotometricFolder",
       "Images with their poses, and points with their grey patches (docs/photometric.md).\n\n"
       "  images: of each (height, width): grey levels, 0 to 255\n"
       "  camera: fx, fy, cx, cy of all, pixels; (0, 0) is the centre of the first one\n"
       "  poses: (n, 7): qw qx qy qz tx ty tz, cam_from_world, looking along +z\n"
       "  points: (m, 3), host: (m,), host_xy: (m, 2): each on the ray of a pixel of its host, the "
-      "image that its patch is taken from")
-      .def("__init__", &construct, nb::arg("images"), nb::arg("camera"), nb::arg("poses"),
-           nb::arg("points"), nb::arg("host"), nb::arg("host_xy"),
-           nb::sig("def __init__(self, images: "
-                   "collections.abc.Sequence[numpy.typing.NDArray[typing.Any]], camera: "
-                   "numpy.typing.ArrayLike, poses: numpy.typing.ArrayLike, points: "
-                   "numpy.typing.ArrayLike, host: numpy.typing.ArrayLike, host_xy: "
-                   "numpy.typing.ArrayLike) -> None"))
+      "image that its patch is taken from");
+  folder.def("__init__", &construct, nb::arg("images"), nb::arg("camera"), nb::arg("poses"),
+             nb::arg("points"), nb::arg("host"), nb::arg("host_xy"),
+             nb::sig("def __init__(self, images: "
+                     "collections.abc.Sequence[numpy.typing.NDArray[typing.Any]], camera: "
+                     "numpy.typing.ArrayLike, poses: numpy.typing.ArrayLike, points: "
+                     "numpy.typing.ArrayLike, host: numpy.typing.ArrayLike, host_xy: "
+                     "numpy.typing.ArrayLike) -> None"));
+  return folder;
+}
+
+/// What it was made of.
+void bind_inputs(FolderClass& folder) {
+  folder
       .def_prop_ro(
           "host", [](const HeldFolder& f) { return array_of(f.problem.host); },
           nb::sig("def host(self) -> numpy.typing.NDArray[numpy.uint32]"),
@@ -242,7 +250,12 @@ void bind_folder(nb::module_& module) {
           },
           nb::arg("index"),
           nb::sig("def image(self, index: int) -> numpy.typing.NDArray[numpy.float64]"),
-          "(height, width): grey levels; a copy.")
+          "(height, width): grey levels; a copy.");
+}
+
+/// What a refinement changes, and where it goes.
+void bind_state(FolderClass& folder) {
+  folder
       .def_prop_ro("poses", &poses_of,
                    nb::sig("def poses(self) -> numpy.typing.NDArray[numpy.float64]"),
                    "(n, 7): qw qx qy qz tx ty tz, cam_from_world; a copy.")
@@ -269,7 +282,9 @@ void bind_folder(nb::module_& module) {
 }  // namespace
 
 void bind_photometric(nb::module_& module) {
-  bind_folder(module);
+  FolderClass folder = bind_folder(module);
+  bind_inputs(folder);
+  bind_state(folder);
   PhotometricReadOptions reading;
   const auto of_reading = bound(photometric_read_fields(), reading);
   module.def("read_photometric", &read_folder, nb::arg("path"), nb::arg("options"),
