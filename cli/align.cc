@@ -18,6 +18,7 @@
 #include "scene/similarity.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -38,21 +39,21 @@ std::string name_of(const ModelAlignment& a, std::size_t k, const Problem& model
 void print(const Arguments& arguments, const ModelAlignment& a, const Problem& model,
            const Problem& reference) {
   constexpr std::size_t kMostSaid = 3;
-  fmt::print("{} onto {}: {}\n{}", arguments.in, arguments.reference, counts_text(model),
-             matching_text(a.matching, model, reference, "model", "reference"));
+  print_out("{} onto {}: {}\n{}", arguments.in, arguments.reference, counts_text(model),
+            Lines{matching_text(a.matching, model, reference, "model", "reference")});
   const Similarity& S = a.similarity;
-  fmt::print("aligned     by {} of {} camera centres\n", a.inliers, a.distances.size());
-  fmt::print("scale       {}\n", S.scale);
-  fmt::print("rotation    {} (w x y z)\n", fmt::join(S.rotation, " "));
-  fmt::print("translation {}\n", fmt::join(S.translation, " "));
+  print_out("aligned     by {} of {} camera centres\n", a.inliers, a.distances.size());
+  print_out("scale       {}\n", S.scale);
+  print_out("rotation    {} (w x y z)\n", fmt::join(S.rotation, " "));
+  print_out("translation {}\n", fmt::join(S.translation, " "));
   const ErrorStatistics errors = statistics_of_errors(a.distances);
-  fmt::print("centres     rms {:.6g}, median {:.6g}, largest {:.6g}, in units of the reference\n",
-             errors.rms, errors.median, errors.max);
+  print_out("centres     rms {:.6g}, median {:.6g}, largest {:.6g}, in units of the reference\n",
+            errors.rms, errors.median, errors.max);
   std::vector<std::string> worst;
   for (const std::size_t k : worst_first(a))
     if (worst.size() < kMostSaid)
       worst.push_back(fmt::format("{} {:.6g}", name_of(a, k, model), a.distances[k]));
-  fmt::print("worst       {}\n", fmt::join(worst, ", "));
+  print_out("worst       {}\n", fmt::join(worst, ", "));
 }
 
 Json worst_json(const ModelAlignment& a, const Problem& model) {
@@ -125,7 +126,7 @@ Written write_moved(const Arguments& arguments, const Problem& problem, Interrup
 
 void finish(const Arguments& arguments, const Written& written, const Problem& problem,
             double read_s, const Timer& total, Json document) {
-  fmt::print("wrote       {} ({})\n", arguments.out, written.format);
+  print_out("wrote       {} ({})\n", arguments.out, written.format);
   print_losses(written.format, problem);
   if (arguments.common.json.empty()) return;
   document["output"] = {
@@ -155,9 +156,10 @@ int run_to_survey(const Arguments& arguments, Interrupt& interrupt, const Timer&
   const std::string frame = write_frame(survey, written.format, arguments.out);
   const std::string& residuals = arguments.constraints.residuals;
   if (!residuals.empty()) write_residuals(report, residuals);
-  fmt::print("{}: {}\n{}{}", arguments.in, counts, survey_text(survey), residuals_text(report));
+  print_out("{}: {}\n{}{}", arguments.in, counts, Lines{survey_text(survey)},
+            Lines{residuals_text(report)});
   for (const std::string& path : {frame, residuals})
-    if (!path.empty()) fmt::print("wrote       {}\n", path);
+    if (!path.empty()) print_out("wrote       {}\n", path);
   finish(arguments, written, model.problem, model.read_s, total,
          document_of(survey, report, input));
   return 0;

@@ -18,6 +18,7 @@
 #include "projection_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -146,15 +147,15 @@ int run(const Arguments& arguments) {
     options.loss = {arguments.loss.kind, found.summary.rounds.back().scale_px};
   found.covariance = covariance(problem, options).value();
   found.projected = projections(arguments.projection, problem, found.covariance);
-  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
+  print_out("{}: {}\n", arguments.in, counts_text(problem));
   for (const std::string& view : found.left_out)
-    fmt::print("left out    view {}: too few corners, or in a line\n", view);
-  fmt::print("{}", summary_text(found.summary, 0));
-  fmt::print("{}{}", covariance_text(problem, options, found.covariance),
-             projection_text(found.projected));
+    print_out("left out    view {}: too few corners, or in a line\n", view);
+  print_text(summary_text(found.summary, 0));
+  print_text(covariance_text(problem, options, found.covariance));
+  print_text(projection_text(found.projected));
   if (!arguments.out.empty()) {
     write(problem, arguments.out).value();
-    fmt::print("wrote       {}\n", arguments.out);
+    print_out("wrote       {}\n", arguments.out);
   }
   write_projections(arguments.projection, problem, found.projected);
   if (!arguments.common.json.empty())

@@ -14,6 +14,7 @@
 #include "outputs.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 #include "weak_lenses.h"
@@ -63,16 +64,16 @@ int run(const Arguments& arguments) {
   std::vector<Finding> findings = check(input.problem);
   if (auto weak = weak_lenses(input.problem, arguments.common.threads))
     findings.push_back(*std::move(weak));
-  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
-  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
+  print_out("{}: {}\n", arguments.in, counts_text(input.problem));
+  for (const std::string& note : input.notes) print_out("note        {}\n", note);
   for (const Finding& finding : findings)
-    fmt::print("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
-               places_text(finding, input.problem));
-  if (findings.empty()) fmt::print("nothing that looks wrong\n");
+    print_out("{}  {}\n{}", finding.grave ? "wrong     " : "note      ", finding.words,
+              Lines{places_text(finding, input.problem)});
+  if (findings.empty()) print_out("nothing that looks wrong\n");
   // On a copy: a survey moves the problem, whose findings are of the file.
   Problem placed = arguments.constraints.paths.empty() ? Problem() : input.problem;
   const std::optional<Survey> survey = place_survey(arguments.constraints, placed, {});
-  if (survey) fmt::print("{}", survey_text(*survey));
+  if (survey) print_text(survey_text(*survey));
   if (json.empty()) return 0;
   Json list = Json::array();
   for (const Finding& finding : findings) list.push_back(finding_json(finding, input.problem));

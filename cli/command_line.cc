@@ -6,14 +6,16 @@
 #include "command_line.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <exception>
 #include <new>
 #include <string>
 #include <utility>
 
+#include "exit_code.h"
+#include "interrupt.h"
 #include "options/options_page.h"
 #include "sheaf/error.h"
+#include "terminal.h"
 
 namespace sheaf {
 namespace {
@@ -105,18 +107,16 @@ int usage_error(const CLI::App& app, const CLI::ParseError& error) {
     message = "expected a verb:";
     for (const CLI::App* verb : app.get_subcommands({})) message += " " + verb->get_name();
   }
-  std::fprintf(stderr, "%s: %s\nSee '%s --help'.\n", name.c_str(), message.c_str(), name.c_str());
+  print_err("{}: {}\nSee '{} --help'.\n", name, message, name);
   return static_cast<int>(ErrorCode::usage);
 }
 
 int complain(const CLI::App& app, const char* message, int code) {
-  std::fprintf(stderr, "%s: %s\n", name_of(app).c_str(), message);
+  print_err("{}: {}\n", name_of(app), message);
   return code;
 }
 
-}  // namespace
-
-int run_command_line(int argc, char** argv, const std::vector<Verb>& verbs) {
+int run(int argc, char** argv, const std::vector<Verb>& verbs) {
   CLI::App app("Sheaf: a bundle adjustment engine.");
   app.name("sheaf");
   app.set_version_flag("--version", "sheaf " SHEAF_VERSION);
@@ -139,6 +139,23 @@ int run_command_line(int argc, char** argv, const std::vector<Verb>& verbs) {
     return complain(app, error.what(), 1);
   }
   return exit_code;
+}
+
+/// A result that nobody could read is none; an error that was told already stays.
+int finish(int exit_code) {
+  const std::string failed = finish_stdout();
+  if (failed.empty()) return exit_code;
+  print_err("sheaf: stdout: cannot be written: {}\n", failed);
+  const bool ran = exit_code == 0 || exit_code == kExitInterrupted || exit_code == kExitTimeLimit;
+  return ran ? static_cast<int>(ErrorCode::unwritable_output) : exit_code;
+}
+
+}  // namespace
+
+int run_command_line(int argc, char** argv, std::vector<Verb> (*verbs)()) {
+  watch_signals();
+  guard_streams();
+  return finish(run(argc, argv, verbs()));
 }
 
 }  // namespace sheaf

@@ -9,7 +9,7 @@
 namespace sheaf {
 
 /// Reads the command line, runs the verb that it names and returns the exit code; what is wrong is
-/// said on stderr.
-int run_command_line(int argc, char** argv, const std::vector<Verb>& verbs);
+/// said on stderr. Signals are watched and streams guarded before anything else is done.
+int run_command_line(int argc, char** argv, std::vector<Verb> (*verbs)());
 
 }  // namespace sheaf

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "io/output_file.h"
+#include "outputs.h"
 
 namespace sheaf {
 namespace {
@@ -196,10 +196,7 @@ std::string write_frame(const Survey& survey, const std::string& format, const s
 }
 
 void write_residuals(const SurveyReport& report, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(residuals_csv(report));
-  file.value().commit().value();
+  write_text(residuals_csv(report), path);
 }
 
 Json survey_json(const std::optional<Survey>& survey, const SurveyReport* report) {

@@ -15,6 +15,7 @@
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -53,7 +54,7 @@ Json cleaned_json(const CleanOptions& options, const CleanRecord& record) {
 }
 
 void print_cleaned(const CleanRecord& r) {
-  fmt::print(
+  print_out(
       "left out    {} observations: {} far off, {} behind, {} in the plane of their camera, {} at "
       "its centre, {} repeated, the others of {} points with narrow rays and {} short tracks\n",
       r.observations, r.far_off.size(), r.behind.size(), r.in_plane.size(), r.at_centre.size(),
@@ -78,10 +79,10 @@ int run(const Arguments& arguments) {
   const Timer writing;
   write(input.problem, arguments.out, {.format = format}).value();
   const double write_s = writing.seconds();
-  fmt::print("{}: {}\n", arguments.in, counts);
-  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
+  print_out("{}: {}\n", arguments.in, counts);
+  for (const std::string& note : input.notes) print_out("note        {}\n", note);
   if (arguments.clean.any()) print_cleaned(cleaned);
-  fmt::print("wrote       {} ({})\n", arguments.out, format);
+  print_out("wrote       {} ({})\n", arguments.out, format);
   print_losses(format, input.problem);
   if (json.empty()) return 0;
   const Json document = {

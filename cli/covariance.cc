@@ -22,6 +22,7 @@
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "survey/image_names.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -116,14 +117,14 @@ int run(const Arguments& arguments) {
     options.fixed = fixed_of(refinement_of(arguments.refinement, problem).value(), problem);
   const std::optional<Survey> survey = place_survey(arguments.constraints, problem, options.fixed);
   const Covariance found = covariance(problem, options).value();
-  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
-  if (survey) fmt::print("{}", survey_text(*survey));
+  print_out("{}: {}\n", arguments.in, counts_text(input.problem));
+  if (survey) print_text(survey_text(*survey));
   const std::vector<LensProjection> projected = projections(arguments.projection, problem, found);
-  fmt::print("{}{}time        {:.3f} s\n", covariance_text(problem, options, found),
-             projection_text(projected), found.seconds);
+  print_out("{}{}time        {:.3f} s\n", Lines{covariance_text(problem, options, found)},
+            Lines{projection_text(projected)}, found.seconds);
   if (!arguments.csv.empty()) {
     write_text(covariance_csv(problem, options, found), arguments.csv);
-    fmt::print("wrote       {}\n", arguments.csv);
+    print_out("wrote       {}\n", arguments.csv);
   }
   write_projections(arguments.projection, problem, projected);
   if (json.empty()) return 0;

@@ -18,6 +18,7 @@
 #include "report/errors.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -41,8 +42,8 @@ double expected_rms_px(const Problem& problem, double sigma) {
 }
 
 void tell_beginning(const SceneOptions& scene, const Problem& problem) {
-  fmt::print("A synthetic scene: {} (seed {}).\n", counts_text(problem), scene.seed);
-  fmt::print(
+  print_out("A synthetic scene: {} (seed {}).\n", counts_text(problem), scene.seed);
+  print_out(
       "The pixels carry {} px of noise; the start is off by {} rad in rotations, {} in\n"
       "camera centres, {} in points (cameras stand about 1 apart) and {} % in focals.\n\n",
       scene.pixel_noise_px, scene.rotation_noise_rad, scene.center_noise, scene.point_noise,
@@ -52,14 +53,14 @@ void tell_beginning(const SceneOptions& scene, const Problem& problem) {
 void tell_end(const SceneOptions& scene, const Problem& problem, const Summary& summary,
               const StateErrors& before, const StateErrors& after) {
   const auto line = [](const char* what, double a, double b) {
-    fmt::print("{:<28} {:>12.6g} {:>12.6g}\n", what, a, b);
+    print_out("{:<28} {:>12.6g} {:>12.6g}\n", what, a, b);
   };
-  fmt::print("\n{:<28} {:>12} {:>12}\n", "median error", "start", "solved");
+  print_out("\n{:<28} {:>12} {:>12}\n", "median error", "start", "solved");
   line("rotations (rad)", before.rotation_error_rad.median, after.rotation_error_rad.median);
   line("camera centres", before.center_error.median, after.center_error.median);
   line("points", before.point_error.median, after.point_error.median);
-  fmt::print("\nThe residual should come down to the noise: {:.4g} px expected, {:.4g} px found.\n",
-             expected_rms_px(problem, scene.pixel_noise_px), summary.final_rms_px);
+  print_out("\nThe residual should come down to the noise: {:.4g} px expected, {:.4g} px found.\n",
+            expected_rms_px(problem, scene.pixel_noise_px), summary.final_rms_px);
 }
 
 Json generated_input(const Problem& problem) {
@@ -98,7 +99,7 @@ int run(const Arguments& arguments) {
 
   const StateErrors before = compare_states(scene.start, scene.truth, true).value();
   const StateErrors after = compare_states(problem, scene.truth, true).value();
-  fmt::print("{}", summary_text(summary, 0));
+  print_text(summary_text(summary, 0));
   tell_end(arguments.scene, problem, summary, before, after);
   tell(photometric);
   const Timer writing;

@@ -8,13 +8,13 @@
 
 #include "errors_document.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "matching_document.h"
 #include "outputs.h"
 #include "report/errors.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -28,10 +28,7 @@ struct Arguments {
 };
 
 void write_csv(const ErrorLists& lists, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(errors_csv(lists));
-  file.value().commit().value();
+  write_text(errors_csv(lists), path);
 }
 
 Json alignment_json(const StateAlignment& a) {
@@ -57,15 +54,15 @@ int run(const Arguments& arguments) {
                                               : AlignBy::least_squares;
   const ErrorLists lists = list_errors(estimate.problem, reference.problem, align_by).value();
   if (!arguments.no_align && !lists.alignment.aligned && !arguments.common.quiet)
-    std::fputs("neither camera centres nor points determine an alignment: compared as they are\n",
+    print_text("neither camera centres nor points determine an alignment: compared as they are\n",
                stderr);
   interrupt.begin_write();
   if (!arguments.csv.empty()) write_csv(lists, arguments.csv);
-  fmt::print(
-      "{} against {}: {}\n{}{}", arguments.estimate, arguments.reference,
-      counts_text(estimate.problem),
-      matching_text(lists.matching, estimate.problem, reference.problem, "estimate", "reference"),
-      errors_text(lists));
+  print_out("{} against {}: {}\n{}{}", arguments.estimate, arguments.reference,
+            counts_text(estimate.problem),
+            Lines{matching_text(lists.matching, estimate.problem, reference.problem, "estimate",
+                                "reference")},
+            Lines{errors_text(lists)});
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION},
                    {"estimate", input_json(arguments.estimate, estimate)},

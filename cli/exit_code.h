@@ -7,14 +7,16 @@
 
 namespace sheaf {
 
+inline constexpr int kExitTimeLimit = 7;
 inline constexpr int kExitInterrupted = 130;
 
-/// Of a solve that ran: 0 for a usable result, 130 when it was cut short, 4 without a usable step
-/// or a weight above 0.
+/// Of a solve that ran: 0 for a usable result, 7 at its time limit, 130 when it was interrupted, 4
+/// without a usable step or a weight above 0.
 inline int exit_code_of(Termination termination) {
   switch (termination) {
-    case Termination::stopped:
     case Termination::time_limit:
+      return kExitTimeLimit;
+    case Termination::stopped:
       return kExitInterrupted;
     case Termination::no_usable_step:
     case Termination::zero_weights:

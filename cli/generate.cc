@@ -20,6 +20,7 @@
 #include "scene_arguments.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -62,7 +63,8 @@ WriteOptions format_of(const std::string& path, const Arguments& arguments) {
   return {.format = model ? "colmap" : ""};
 }
 
-Made write_whole(const Scene& scene, const Arguments& arguments) {
+Made write_whole(const Scene& scene, const Arguments& arguments, Interrupt& interrupt) {
+  interrupt.begin_write();
   const Timer writing;
   write(scene.start, arguments.out, format_of(arguments.out, arguments)).value();
   if (!arguments.truth.empty())
@@ -78,17 +80,20 @@ StreamedScene stream_to(CountingSink& sink, const FamilyOptions& options, SceneS
   return scene;
 }
 
+// What is written while it is made is given up by a signal; what is there already is written.
 Made make(const Arguments& arguments, Interrupt& interrupt) {
-  interrupt.begin_write();
   if (arguments.rigs.chosen())
     return write_whole(
-        generate(rig_options(arguments.rigs, arguments.lens, arguments.scene)).value(), arguments);
+        generate(rig_options(arguments.rigs, arguments.lens, arguments.scene)).value(), arguments,
+        interrupt);
   if (arguments.lens.chosen())
-    return write_whole(generate(lens_options(arguments.lens, arguments.scene)).value(), arguments);
-  if (!arguments.family.chosen()) return write_whole(generate(arguments.scene).value(), arguments);
+    return write_whole(generate(lens_options(arguments.lens, arguments.scene)).value(), arguments,
+                       interrupt);
+  if (!arguments.family.chosen())
+    return write_whole(generate(arguments.scene).value(), arguments, interrupt);
   const FamilyOptions options = family_options(arguments.family, arguments.scene);
   if (is_point_cloud(arguments.out) || is_point_cloud(arguments.truth))
-    return write_whole(generate(options).value(), arguments);
+    return write_whole(generate(options).value(), arguments, interrupt);
   CountingSink start(create_output(arguments.out).value());
   const StreamedScene scene = stream_to(start, options, SceneState::start);
   if (!arguments.truth.empty()) {
@@ -124,13 +129,13 @@ int run(const Arguments& arguments) {
       {{"OUT", arguments.out, folders}, {"--truth", arguments.truth, folders}, {"--json", json}});
   const Made made = make(arguments, interrupt);
   const Statistics& statistics = made.statistics;
-  fmt::print("{}: {}\n", arguments.out, made.text);
-  fmt::print("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
-             statistics.track.min, statistics.track.max, statistics.mean_track);
-  fmt::print("images      {:.0f} to {:.0f} observations, median {:.6g}\n",
-             statistics.observations_per_image.min, statistics.observations_per_image.max,
-             statistics.observations_per_image.median);
-  fmt::print("rms         {:.6g} px at the start\n", made.rms_px);
+  print_out("{}: {}\n", arguments.out, made.text);
+  print_out("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
+            statistics.track.min, statistics.track.max, statistics.mean_track);
+  print_out("images      {:.0f} to {:.0f} observations, median {:.6g}\n",
+            statistics.observations_per_image.min, statistics.observations_per_image.max,
+            statistics.observations_per_image.median);
+  print_out("rms         {:.6g} px at the start\n", made.rms_px);
   if (!json.empty()) write_json(document_of(arguments, made, total.seconds()), json);
   return 0;
 }
@@ -145,7 +150,9 @@ int run_photometric(const Arguments& arguments) {
     options.points = static_cast<std::uint32_t>(arguments.scene.points);
   if (arguments.given.contains("outliers")) options.outliers = arguments.family.outliers;
   options.seed = arguments.scene.seed;
-  return generate_photometric(options, arguments.out, arguments.truth, arguments.common.json);
+  Interrupt interrupt(arguments.common.quiet);
+  return generate_photometric(options, arguments.out, arguments.truth, arguments.common.json,
+                              interrupt);
 }
 
 void remember_given(std::vector<BoundOption>& options, std::set<std::string>& given) {

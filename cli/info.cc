@@ -11,13 +11,13 @@
 #include "image/png.h"
 #include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -50,14 +50,11 @@ PatternCounts write_pattern(const Problem& problem, const std::string& name,
       draw_patterns(problem,
                     std::filesystem::path(name).filename().string() + ": " + counts_text(problem))
           .value();
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(encode_png(figure.image).value());
-  file.value().commit().value();
+  write_text(encode_png(figure.image).value(), path);
   const PatternCounts& c = figure.counts;
-  fmt::print("network     {} pairs of images with points in common, {:.3g}% of all\n", c.links,
-             100 * c.fill);
-  fmt::print("patterns    {}\n", path);
+  print_out("network     {} pairs of images with points in common, {:.3g}% of all\n", c.links,
+            100 * c.fill);
+  print_out("patterns    {}\n", path);
   return c;
 }
 
@@ -79,9 +76,9 @@ void print_histogram(const Statistics& statistics) {
     begin = end;
     end = end < 10 ? end + 1 : 2 * end;
   }
-  fmt::print("points by number of observations:\n");
+  print_out("points by number of observations:\n");
   for (const auto& [label, points] : bars)
-    fmt::print("{:>11}  {:>9}  {}\n", label, points, std::string(points * 40 / most, '#'));
+    print_out("{:>11}  {:>9}  {}\n", label, points, std::string(points * 40 / most, '#'));
 }
 
 std::map<std::string, std::size_t> lenses_of(const Problem& problem) {
@@ -111,13 +108,13 @@ std::string lenses_text(const Problem& problem) {
 void print_rigs(const Problem& problem) {
   const Rigs& rigs = problem.rigs;
   if (!rigs.empty())
-    fmt::print("rigs        {} of {} sensors, {} frames of {} images\n", rigs.count,
-               rigs.num_sensors(), rigs.num_frames(), images_of_rigs(rigs));
+    print_out("rigs        {} of {} sensors, {} frames of {} images\n", rigs.count,
+              rigs.num_sensors(), rigs.num_frames(), images_of_rigs(rigs));
   const std::vector<std::uint32_t> stale = stale_poses(problem);
   if (stale.empty()) return;
   constexpr std::size_t kShown = 8;
   const std::size_t shown = std::min(stale.size(), kShown);
-  fmt::print(
+  print_out(
       "stale       {} images have other poses in the file of images than frames and rigs give, "
       "which hold: images {}{}\n",
       stale.size(),
@@ -145,26 +142,25 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   const Range& images = statistics.observations_per_image;
   const Range& focal = statistics.focal_px;
   const std::string packed = input.compression == "none" ? "" : ", " + input.compression;
-  fmt::print("{}: {}\n", path, counts_text(input.problem));
-  fmt::print("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
-             input.read_s);
-  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
-  fmt::print("lenses      {}\n", lenses_text(input.problem));
+  print_out("{}: {}\n", path, counts_text(input.problem));
+  print_out("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
+            input.read_s);
+  for (const std::string& note : input.notes) print_out("note        {}\n", note);
+  print_out("lenses      {}\n", lenses_text(input.problem));
   print_rigs(input.problem);
-  fmt::print("cost        {:.9e}\n", evaluation.cost);
-  fmt::print("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n",
-             evaluation.rms_px, statistics.mean_error_px);
-  fmt::print("behind      {} observations behind their camera\n", evaluation.behind.size());
+  print_out("cost        {:.9e}\n", evaluation.cost);
+  print_out("rms         {:.6g} px, mean of the points' mean errors {:.6g} px\n", evaluation.rms_px,
+            statistics.mean_error_px);
+  print_out("behind      {} observations behind their camera\n", evaluation.behind.size());
   if (!evaluation.not_finite.empty())
-    fmt::print("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
-  fmt::print("images      {:.0f} to {:.0f} observations, median {:.6g}\n", images.min, images.max,
-             images.median);
-  fmt::print("focal       {:.6g} to {:.6g} px, median {:.6g}\n", focal.min, focal.max,
-             focal.median);
-  fmt::print("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
-             statistics.track.min, statistics.track.max, statistics.mean_track);
-  fmt::print("memory      {} bytes for the problem, {} bytes at most for the process\n",
-             size_bytes(input.problem), peak_resident_bytes());
+    print_out("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
+  print_out("images      {:.0f} to {:.0f} observations, median {:.6g}\n", images.min, images.max,
+            images.median);
+  print_out("focal       {:.6g} to {:.6g} px, median {:.6g}\n", focal.min, focal.max, focal.median);
+  print_out("tracks      {:.0f} to {:.0f} observations a point, mean {:.3f}\n",
+            statistics.track.min, statistics.track.max, statistics.mean_track);
+  print_out("memory      {} bytes for the problem, {} bytes at most for the process\n",
+            size_bytes(input.problem), peak_resident_bytes());
   print_histogram(statistics);
 }
 

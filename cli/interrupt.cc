@@ -2,54 +2,90 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "interrupt.h"
 
-#include <pthread.h>
+#include <poll.h>
 #include <signal.h>
+#include <unistd.h>
 
-#include <cstdio>
-#include <cstdlib>
+#include <atomic>
+#include <cerrno>
+#include <string_view>
 
 #include "exit_code.h"
+#include "io/partial.h"
 
 namespace sheaf {
 namespace {
 
-sigset_t watched_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  return signals;
+enum class Phase { read, solve, write, over };
+
+/// What the handler looks at. Signals are the process's, and so is this.
+struct Watch {
+  std::atomic<Phase> phase{Phase::read};
+  std::atomic<bool> quiet{false};
+  std::atomic<int> taken{0};
+  std::atomic<int> child{0};  ///< a process group
+  std::atomic<StopSource*> stop{nullptr};
+};
+Watch watch;
+
+/// Never waits: a full pipe on stderr must not hold up what was asked for.
+void tell(std::string_view words) {
+  pollfd ready{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&ready, 1, 0) == 1) (void)!::write(STDERR_FILENO, words.data(), words.size());
+}
+
+[[noreturn]] void leave() {
+  if (const int child = watch.child) ::kill(-child, SIGKILL);
+  unlink_partial_files();
+  ::_exit(kExitInterrupted);
+}
+
+extern "C" void take_signal(int) {
+  const int error = errno;
+  const Phase phase = watch.phase;
+  if (phase == Phase::read || watch.taken.fetch_add(1) > 0) leave();
+  if (!watch.quiet && phase == Phase::solve)
+    tell("interrupted: the best state will be written (again: end at once without)\n");
+  if (!watch.quiet && phase == Phase::write)
+    tell("interrupted: the file will be finished (again: end at once)\n");
+  if (StopSource* stop = watch.stop) stop->request_stop();
+  errno = error;
 }
 
 }  // namespace
 
-Interrupt::Interrupt(bool quiet) : quiet_(quiet) {
-  const sigset_t signals = watched_signals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  watcher_ = std::thread([this] { watch(); });
+void watch_signals() {
+  ::signal(SIGPIPE, SIG_IGN);
+  ::signal(SIGXFSZ, SIG_IGN);
+  struct sigaction action {};
+  action.sa_handler = take_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigset_t taken;
+  sigemptyset(&taken);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    if (::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_IGN) continue;
+    ::sigaction(signal, &action, nullptr);
+    sigaddset(&taken, signal);
+  }
+  // A parent may have blocked them for itself alone.
+  ::sigprocmask(SIG_UNBLOCK, &taken, nullptr);
+}
+
+void end_with_this(int process_group) { watch.child = process_group; }
+
+Interrupt::Interrupt(bool quiet) {
+  watch.quiet = quiet;
+  watch.stop = &stop_;
 }
 
 Interrupt::~Interrupt() {
-  phase_ = Phase::over;
-  pthread_kill(watcher_.native_handle(), SIGTERM);  // wakes the watcher alone
-  watcher_.join();
+  watch.phase = Phase::over;
+  watch.stop = nullptr;
 }
 
-void Interrupt::watch() {
-  const sigset_t signals = watched_signals();
-  for (int taken = 0;; ++taken) {
-    int signal = 0;
-    while (sigwait(&signals, &signal) != 0) continue;
-    const Phase phase = phase_;
-    if (phase == Phase::over) return;
-    if (phase == Phase::read || taken > 0) std::_Exit(kExitInterrupted);
-    if (!quiet_)
-      std::fputs(phase == Phase::solve
-                     ? "interrupted: the best state will be written (again: end at once without)\n"
-                     : "interrupted: the file will be finished (again: end at once)\n",
-                 stderr);
-    stop_.request_stop();
-  }
-}
+void Interrupt::begin_solve() { watch.phase = Phase::solve; }
+void Interrupt::begin_write() { watch.phase = Phase::write; }
 
 }  // namespace sheaf

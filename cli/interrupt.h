@@ -2,20 +2,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <atomic>
-#include <thread>
-
 #include "sheaf/stop.h"
 
 namespace sheaf {
 
-/// What Ctrl-C (SIGINT) and SIGTERM do. Until `begin_solve` they end the command at once: there is
+/// What Ctrl-C (SIGINT), SIGTERM and SIGHUP do from now on, all alike: they end the command at once
+/// with kExitInterrupted, unless an Interrupt says otherwise. One that was ignored when the command
+/// began (nohup) stays ignored. SIGPIPE and SIGXFSZ become errors of writing. To be called first of
+/// all.
+void watch_signals();
+
+/// A process that the command has started and that must not outlive it: its group is killed with
+/// the command. 0: none.
+void end_with_this(int process_group);
+
+/// What a signal means while a verb runs. Until `begin_solve` it ends the command at once: there is
 /// nothing to save. From then on the first one asks the solver to stop, so that its best state can
 /// be written. From `begin_write` on the first one waits for the file. A second one always ends the
-/// command at once.
-///
-/// Construct it before any thread is started: the signals are blocked in the constructing thread
-/// and all that it starts later, and one thread waits for them.
+/// command at once, partial files removed. One at a time.
 class Interrupt {
  public:
   explicit Interrupt(bool quiet);
@@ -23,18 +27,12 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
-  void begin_solve() { phase_ = Phase::solve; }
-  void begin_write() { phase_ = Phase::write; }
+  void begin_solve();
+  void begin_write();
   StopToken token() const { return stop_.get_token(); }
 
  private:
-  enum class Phase { read, solve, write, over };
-  void watch();
-
   StopSource stop_;
-  std::atomic<Phase> phase_{Phase::read};
-  bool quiet_;
-  std::thread watcher_;
 };
 
 }  // namespace sheaf

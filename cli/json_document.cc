@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "inspect/statistics.h"
-#include "io/output_file.h"
+#include "outputs.h"
 #include "platform/memory.h"
 
 namespace sheaf {
@@ -217,10 +217,8 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
 }
 
 void write_json(const Json& document, const std::string& path) {
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(document.dump(1) + "\n");
-  file.value().commit().value();
+  // Names of files may be in any encoding; JSON is UTF-8.
+  write_text(document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n", path);
 }
 
 }  // namespace sheaf

@@ -3,4 +3,4 @@
 #include "command_line.h"
 #include "verb.h"
 
-int main(int argc, char** argv) { return sheaf::run_command_line(argc, argv, sheaf::all_verbs()); }
+int main(int argc, char** argv) { return sheaf::run_command_line(argc, argv, sheaf::all_verbs); }

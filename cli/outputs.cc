@@ -6,9 +6,13 @@
 
 #include <filesystem>
 
+#include "io/folder_files.h"
 #include "io/output_file.h"
+#include "io/output_folder.h"
+#include "io/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
+#include "terminal.h"
 
 namespace sheaf {
 
@@ -32,10 +36,33 @@ bool touches(const std::string& output, const std::string& input) {
   std::error_code ignored;
   if (fs::is_fifo(input, ignored) || fs::is_character_file(input, ignored)) return false;
   if (is_same(output, input)) return true;
-  if (!fs::is_directory(input, ignored)) return false;
-  for (const auto& entry : fs::directory_iterator(input, ignored))
-    if (entry.is_regular_file(ignored) && is_same(output, entry.path())) return true;
+  if (!fs::is_directory(input, ignored) || !fs::is_regular_file(output, ignored)) return false;
+  for (fs::recursive_directory_iterator at(input, ignored), end; !ignored && at != end;
+       at.increment(ignored)) {
+    std::error_code of_one;
+    if (at->is_regular_file(of_one) && fs::equivalent(output, at->path(), of_one)) return true;
+  }
   return false;
+}
+
+/// What another model left in a folder, which would be mixed up with the one that is written; what
+/// `write` would say after the solve is said before it.
+void check_model_folder(const Problem& problem, const std::string& format,
+                        const std::string& path) {
+  const OutputFolder folder = OutputFolder::create(path).value();
+  const bool text = format == "colmap-text";
+  const SourceFiles* source = problem.metadata ? problem.metadata->source.get() : nullptr;
+  const bool rigs = !problem.rigs.empty() || (source != nullptr && !source->rigs.empty());
+  for (const char* stem : {"cameras", "images", "points3D", "rigs", "frames"}) {
+    const std::string name = std::string(stem) + (text ? ".txt" : ".bin");
+    const std::string other = std::string(stem) + (text ? ".bin" : ".txt");
+    const bool of_rigs = stem[0] == 'r' || stem[0] == 'f';
+    if (folder.had(other) || (of_rigs && !rigs && folder.had(name)))
+      throw Error(ErrorCode::unwritable_output,
+                  fmt::format("{}: cannot be written: it holds {} of another model, which would be "
+                              "mixed up with what is written",
+                              path, folder.had(other) ? other : name));
+  }
 }
 
 }  // namespace
@@ -56,13 +83,18 @@ void check_outputs(const std::vector<NamedOutput>& outputs,
             ErrorCode::usage,
             fmt::format("{} names {}, which the input {} would be lost by: name another one",
                         output.option, output.path, input));
-    check_writable(output.path, output.model).value();
+    if (output.folder)
+      make_output_folder(output.path).value();
+    else
+      check_writable(output.path, output.model).value();
   }
 }
 
 void check_holds(const Problem& problem, const std::string& path) {
   if (path.empty()) return;
-  can_hold(write_format(problem, path), problem).value();
+  const std::string format = write_format(problem, path);
+  can_hold(format, problem).value();
+  if (format.starts_with("colmap")) check_model_folder(problem, format, path);
 }
 
 std::uint64_t bytes_at(const std::string& path) {
@@ -77,7 +109,7 @@ std::uint64_t bytes_at(const std::string& path) {
 
 void print_losses(const std::string& format, const Problem& problem) {
   for (const std::string& sentence : lost_in(format, problem))
-    fmt::print("dropped     {}\n", sentence);
+    print_out("dropped     {}\n", sentence);
 }
 
 void write_text(const std::string& text, const std::string& path) {

@@ -12,19 +12,21 @@ namespace sheaf {
 
 struct NamedOutput {
   std::string option;
-  std::string path;    ///< empty: not asked for
-  bool model = false;  ///< a problem, which may be a folder
+  std::string path;     ///< empty: not asked for
+  bool model = false;   ///< a problem, which may be a folder
+  bool folder = false;  ///< a folder in any case; those that it lies in are made
 };
 
 /// Before anything is computed: throws Error (ErrorCode::usage) when two options name one file, or
-/// one names an input or a file of an input's folder, by any name, and Error
+/// one names an input or a file of an input's folder or of one in it, by any name, and Error
 /// (ErrorCode::unwritable_output) when a file cannot be written. inputs: files and folders; empty
 /// ones were not given.
 void check_outputs(const std::vector<NamedOutput>& outputs,
                    const std::vector<std::string>& inputs = {});
 
 /// Before anything is computed: throws Error (ErrorCode::usage) where `write` would refuse the
-/// problem's lenses under this name. Nothing without a name.
+/// problem's lenses under this name, and Error (ErrorCode::unwritable_output) where it would refuse
+/// the folder of a model. Nothing without a name.
 void check_holds(const Problem& problem, const std::string& path);
 
 /// Of a file, or of the files of a folder.

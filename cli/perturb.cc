@@ -13,6 +13,7 @@
 #include "outputs.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -33,22 +34,22 @@ struct Effect {
 
 void print(const Arguments& arguments, const Problem& problem, const NoiseOptions& noise,
            const Effect& effect) {
-  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
+  print_out("{}: {}\n", arguments.in, counts_text(problem));
   if (noise.normalize_to > 0) {
     const auto& [center, scale] = effect.record.normalization;
-    fmt::print("normalised  moved by {:.6g} {:.6g} {:.6g}, scaled by {:.6g}\n", -center[0],
-               -center[1], -center[2], scale);
+    print_out("normalised  moved by {:.6g} {:.6g} {:.6g}, scaled by {:.6g}\n", -center[0],
+              -center[1], -center[2], scale);
   }
-  fmt::print("noise       {}\n", noise_text(noise));
+  print_out("noise       {}\n", noise_text(noise));
   if (!effect.record.outliers.empty())
-    fmt::print("outliers    {} observations moved by {:.6g} px\n", effect.record.outliers.size(),
-               noise.outlier_px);
+    print_out("outliers    {} observations moved by {:.6g} px\n", effect.record.outliers.size(),
+              noise.outlier_px);
   if (noise.least_depth > 0)
-    fmt::print("left out    {} observations and {} points nearer than {:.6g}\n",
-               effect.record.dropped_observations, effect.record.dropped_points, noise.least_depth);
-  fmt::print("cost        {:.9e} -> {:.9e}\n", effect.before.cost, effect.after.cost);
-  fmt::print("rms         {:.6g} -> {:.6g} px\n", effect.before.rms_px, effect.after.rms_px);
-  fmt::print("wrote       {}\n", arguments.out);
+    print_out("left out    {} observations and {} points nearer than {:.6g}\n",
+              effect.record.dropped_observations, effect.record.dropped_points, noise.least_depth);
+  print_out("cost        {:.9e} -> {:.9e}\n", effect.before.cost, effect.after.cost);
+  print_out("rms         {:.6g} -> {:.6g} px\n", effect.before.rms_px, effect.after.rms_px);
+  print_out("wrote       {}\n", arguments.out);
   print_losses(write_format(problem, arguments.out), problem);
 }
 

@@ -5,8 +5,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
 #include <string.h>
+#if defined(__linux__)
+#include <sys/prctl.h>
+#endif
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,6 +19,8 @@
 #include <string_view>
 #include <thread>
 
+#include "interrupt.h"
+#include "io/partial.h"
 #include "sheaf/error.h"
 #include "timer.h"
 
@@ -54,30 +58,53 @@ std::vector<std::string> environment(const std::vector<std::string>& variables) 
   return out;
 }
 
-// In a group of its own, so that all it starts can be ended with it, and with the signals free that
-// this process has blocked for its own watcher.
+// Between fork and exec, where nothing may be allocated: a group of its own, so that all it starts
+// can be ended with it; the end of this process is its end; signals as a program expects them.
+[[noreturn]] void become(char** words, char** settings, const char* out, const char* err,
+                         pid_t parent, int tell) {
+  ::setpgid(0, 0);
+#if defined(__linux__)
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+#endif
+  ::signal(SIGPIPE, SIG_DFL);
+  ::signal(SIGXFSZ, SIG_DFL);
+  constexpr int kCreate = O_CREAT | O_WRONLY | O_TRUNC;
+  const int files[] = {::open("/dev/null", O_RDONLY), ::open(out, kCreate, 0600),
+                       ::open(err, kCreate, 0600)};
+  for (int fd = 0; fd < 3; ++fd)
+    if (::dup2(files[fd], fd) < 0) ::_exit(127);
+  for (const int file : files)
+    if (file > STDERR_FILENO) ::close(file);
+  if (::getppid() == parent) ::execve(words[0], words, settings);
+  const int error = errno;
+  (void)!::write(tell, &error, sizeof error);
+  ::_exit(127);
+}
+
 pid_t spawn(std::vector<std::string> words, const std::vector<std::string>& variables,
             const fs::path& folder) {
   std::vector<std::string> settings = environment(variables);
   const std::string out = folder / "out", err = folder / "err";
-  posix_spawn_file_actions_t files;
-  posix_spawn_file_actions_init(&files);
-  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  const int create = O_CREAT | O_WRONLY | O_TRUNC;
-  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), create, 0600);
-  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, err.c_str(), create, 0600);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
-  pid_t process = -1;
-  const int error = posix_spawn(&process, words[0].c_str(), &files, &attributes,
-                                pointers(words).data(), pointers(settings).data());
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&files);
+  const std::vector<char*> argv = pointers(words), envp = pointers(settings);
+  int told[2];  // an error of exec; closed by its success
+  if (::pipe(told) != 0)
+    throw Error(ErrorCode::usage, fmt::format("{} cannot be run: {}", words[0], strerror(errno)));
+  for (const int fd : told) ::fcntl(fd, F_SETFD, FD_CLOEXEC);
+  const pid_t parent = ::getpid(), process = ::fork();
+  if (process == 0)
+    become(const_cast<char**>(argv.data()), const_cast<char**>(envp.data()), out.c_str(),
+           err.c_str(), parent, told[1]);
+  int error = process < 0 ? errno : 0;
+  ::close(told[1]);
+  if (process > 0) {
+    ::setpgid(process, process);
+    end_with_this(process);
+    if (::read(told[0], &error, sizeof error) == sizeof error) {
+      ::waitpid(process, nullptr, 0);
+      end_with_this(0);
+    }
+  }
+  ::close(told[0]);
   if (error != 0)
     throw Error(ErrorCode::usage, fmt::format("{} cannot be run: {}", words[0], strerror(error)));
   return process;
@@ -117,6 +144,7 @@ ProgramOutcome run_program(const std::vector<std::string>& words,
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   kill(-process, SIGKILL);  // whatever it left behind
+  end_with_this(0);
   if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) outcome.signal = WTERMSIG(status);
   outcome.out = contents_of(folder / "out");
@@ -126,16 +154,16 @@ ProgramOutcome run_program(const std::vector<std::string>& words,
 
 ScratchFolder::ScratchFolder() {
   std::error_code error;
-  std::string pattern = fs::temp_directory_path(error) / "sheaf-XXXXXX";
-  if (mkdtemp(pattern.data()) == nullptr)
-    throw Error(ErrorCode::unwritable_output,
-                fmt::format("{}: no temporary folder can be made: {}", pattern, strerror(errno)));
-  path_ = pattern;
+  const fs::path target = fs::temp_directory_path(error) / "sheaf-compare";
+  Partial claimed = claim_partial_folder(target, 0700, target).value();
+  path_ = std::move(claimed.path);
+  lock_ = claimed.fd;
 }
 
 ScratchFolder::~ScratchFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
+  ::close(lock_);
 }
 
 }  // namespace sheaf

@@ -23,14 +23,15 @@ struct ProgramOutcome {
 
 /// Runs words[0] with the arguments words[1...] and the environment plus `variables`
 /// ("NAME=VALUE"), its streams going to files in `folder`. After limit_s seconds the process and
-/// all that it started are killed. Throws Error (ErrorCode::usage) when it cannot be started.
+/// all that it started are killed; the process is also where this one ends. Throws Error
+/// (ErrorCode::usage) when it cannot be started.
 ProgramOutcome run_program(const std::vector<std::string>& words,
                            const std::vector<std::string>& variables,
                            const std::filesystem::path& folder, double limit_s,
                            const StopToken& stop);
 
-/// A folder of its own, removed with all in it at the end. Throws Error
-/// (ErrorCode::unwritable_output) when it cannot be made.
+/// A folder of its own, removed with all in it at the end; one that a killed run left is removed by
+/// the next (io/partial.h). Throws Error (ErrorCode::unwritable_output) when it cannot be made.
 class ScratchFolder {
  public:
   ScratchFolder();
@@ -41,6 +42,7 @@ class ScratchFolder {
 
  private:
   std::filesystem::path path_;
+  int lock_;
 };
 
 }  // namespace sheaf

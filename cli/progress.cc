@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <string>
 
+#include "terminal.h"
+
 namespace sheaf {
 
 Progress::Progress(bool quiet)
@@ -18,8 +20,8 @@ Progress::Progress(bool quiet)
 
 void Progress::report_plan(const Summary& summary) {
   if (style_ == Style::none) return;
-  fmt::print(stderr, "solver {}: {}; memory about {:.0f} MB\n", summary.solver,
-             summary.solver_reason, 1e-6 * static_cast<double>(summary.forecast_bytes));
+  print_err("solver {}: {}; memory about {:.0f} MB\n", summary.solver, summary.solver_reason,
+            1e-6 * static_cast<double>(summary.forecast_bytes));
 }
 
 namespace {
@@ -35,36 +37,35 @@ void Progress::report(const Iteration& it) {
   const std::string change = shown(it.trial_cost - it.start_cost, "{:.3e}");
   const std::string gain = std::isfinite(it.trial_cost) ? shown(it.gain_ratio, "{:.3f}") : "-";
   if (style_ != Style::none && it.round != round_)
-    fmt::print(stderr, "round {}: the loss has another scale, the cost is {:.9e}\n", it.round + 1,
-               it.start_cost);
+    print_err("round {}: the loss has another scale, the cost is {:.9e}\n", it.round + 1,
+              it.start_cost);
   round_ = it.round;
   if (style_ != Style::none && it.passes > 0) {
-    fmt::print(stderr,
-               "{}: steps went wrong; {} passes of resection and intersection led to cost {:.9e}\n",
-               it.index, it.passes, it.cost);
+    print_err("{}: steps went wrong; {} passes of resection and intersection led to cost {:.9e}\n",
+              it.index, it.passes, it.cost);
     return;
   }
   if (style_ == Style::table) {
     if (it.index == 0)
-      fmt::print(stderr, "{:>5} {:>16} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "iter", "cost", "change",
-                 "gain", "damping", "gradient", "time (s)");
+      print_err("{:>5} {:>16} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "iter", "cost", "change", "gain",
+                "damping", "gradient", "time (s)");
     if (it.index == 0)
-      fmt::print(stderr, "{:>5} {:>16.9e} {:>11} {:>8} {:>9} {:>9.2e} {:>9.3f}\n", 0, it.cost, "",
-                 "", "", it.gradient_max, it.time_s);
+      print_err("{:>5} {:>16.9e} {:>11} {:>8} {:>9} {:>9.2e} {:>9.3f}\n", 0, it.cost, "", "", "",
+                it.gradient_max, it.time_s);
     else
-      fmt::print(stderr, "{:>5} {:>16.9e} {:>11} {:>8} {:>9.2e} {:>9.2e} {:>9.3f}{}\n", it.index,
-                 it.cost, change, gain, it.damping, it.gradient_max, it.time_s,
-                 it.accepted ? "" : "  rejected");
+      print_err("{:>5} {:>16.9e} {:>11} {:>8} {:>9.2e} {:>9.2e} {:>9.3f}{}\n", it.index, it.cost,
+                change, gain, it.damping, it.gradient_max, it.time_s,
+                it.accepted ? "" : "  rejected");
     std::fflush(stderr);
   } else if (style_ == Style::lines) {
     if (it.index == 0)
-      fmt::print(stderr, "start: cost {}\n", shown(it.cost, "{:.9e}"));
+      print_err("start: cost {}\n", shown(it.cost, "{:.9e}"));
     else
-      fmt::print(stderr,
-                 "iteration {}: cost {:.9e}, change {}{}, gain {}, damping {:.2e}, "
-                 "gradient {:.2e}, {:.3f} s\n",
-                 it.index, it.cost, change, it.accepted ? "" : " (rejected)", gain, it.damping,
-                 it.gradient_max, it.time_s);
+      print_err(
+          "iteration {}: cost {:.9e}, change {}{}, gain {}, damping {:.2e}, "
+          "gradient {:.2e}, {:.3f} s\n",
+          it.index, it.cost, change, it.accepted ? "" : " (rejected)", gain, it.damping,
+          it.gradient_max, it.time_s);
   }
 }
 

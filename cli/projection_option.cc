@@ -10,6 +10,7 @@
 
 #include "outputs.h"
 #include "report/projection_figure.h"
+#include "terminal.h"
 
 namespace sheaf {
 namespace {
@@ -142,7 +143,7 @@ void write_projections(const ProjectionArguments& arguments, const Problem& prob
                        const std::vector<LensProjection>& all) {
   const auto write = [](const std::string& text, const std::string& path) {
     write_text(text, path);
-    fmt::print("wrote       {}\n", path);
+    print_out("wrote       {}\n", path);
   };
   if (!arguments.csv.empty()) write(projection_csv(all), arguments.csv);
   if (arguments.figure.empty()) return;

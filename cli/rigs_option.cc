@@ -8,25 +8,25 @@
 
 #include "io/rig_configuration_file.h"
 #include "scene/rig_configuration.h"
+#include "terminal.h"
 
 namespace sheaf {
 namespace {
 
 void report(const RigLayout& layout, const std::string& path) {
-  fmt::print(stderr, "rigs        {}: {} sensors, {} frames of {} images, {} images of no rig\n",
-             path, layout.sensors.size(), layout.frames, layout.images, layout.images_of_no_rig);
+  print_err("rigs        {}: {} sensors, {} frames of {} images, {} images of no rig\n", path,
+            layout.sensors.size(), layout.frames, layout.images, layout.images_of_no_rig);
   if (layout.copied_cameras > 0)
-    fmt::print(stderr,
-               "            {} sensors that shared a camera have a copy of it, since a COLMAP "
-               "model has one camera for each sensor\n",
-               layout.copied_cameras);
+    print_err(
+        "            {} sensors that shared a camera have a copy of it, since a COLMAP "
+        "model has one camera for each sensor\n",
+        layout.copied_cameras);
   for (const SensorSpread& s : layout.sensors) {
     if (s.reference) {
-      fmt::print(stderr, "            {}: reference, {} images\n", s.image_prefix, s.images);
+      print_err("            {}: reference, {} images\n", s.image_prefix, s.images);
       continue;
     }
-    fmt::print(
-        stderr,
+    print_err(
         "            {}: {}, {} images; in {} frames their poses were off by {:.3g} rad and "
         "{:.3g} (medians), {:.3g} rad and {:.3g} at most\n",
         s.image_prefix,

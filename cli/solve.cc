@@ -23,6 +23,7 @@
 #include "scene/subset.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -163,20 +164,19 @@ SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt,
 void say(const Arguments& arguments, const InputFile& input, const SolveRecord& record,
          const SurveyWork& work, const SigmasWork& sigmas, const Summary& summary,
          const std::string& held) {
-  fmt::print("{}: {}\n", arguments.in, counts_text(input.problem));
-  for (const std::string& note : input.notes) fmt::print("note        {}\n", note);
-  if (work.survey) fmt::print("{}", survey_text(*work.survey));
+  print_out("{}: {}\n", arguments.in, counts_text(input.problem));
+  for (const std::string& note : input.notes) print_out("note        {}\n", note);
+  if (work.survey) print_text(survey_text(*work.survey));
   if (arguments.common.threads > summary.threads)
-    fmt::print("note        {} threads are more than the most, {}\n", arguments.common.threads,
-               summary.threads);
-  fmt::print("{}", summary_text(summary, input.read_s));
-  fmt::print("{}", residuals_text(work.report));
-  if (sigmas.found) fmt::print("{}", covariance_text(input.problem, {}, *sigmas.found));
-  fmt::print("{}", held);
+    print_out("note        {} threads are more than the most, {}\n", arguments.common.threads,
+              summary.threads);
+  print_text(summary_text(summary, input.read_s));
+  print_text(residuals_text(work.report));
+  if (sigmas.found) print_text(covariance_text(input.problem, {}, *sigmas.found));
+  print_text(held);
   if (!record.agrees)
-    fmt::print(
-        "wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
-        record.after.cost, summary.final_plain_cost);
+    print_out("wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
+              record.after.cost, summary.final_plain_cost);
 }
 
 int run(Arguments& arguments) {
@@ -230,7 +230,7 @@ int run(Arguments& arguments) {
     write_json(document, arguments.common.json);
     written.push_back(arguments.common.json);
   }
-  if (!written.empty()) fmt::print("wrote       {}\n", fmt::join(written, ", "));
+  if (!written.empty()) print_out("wrote       {}\n", fmt::join(written, ", "));
   if (summary.usable() && !arguments.out.empty())
     print_losses(write_format(problem, arguments.out), problem);
   if (sigmas.failed) throw *sigmas.failed;

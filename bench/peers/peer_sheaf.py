@@ -95,7 +95,7 @@ def main():
         _, status, usage = os.wait4(child.pid, 0)
         wall = time.perf_counter() - start
         code = os.waitstatus_to_exitcode(status)
-        if code not in (0, 130):  # 130: the time limit, with the best state written
+        if code not in (0, 7):  # 7: the time limit, with the best state written
             sys.exit(code if code > 0 else 1)
         with open(json_path) as file:
             document = json.load(file)

@@ -16,7 +16,6 @@
 #include "compare/solver_run.h"
 #include "exit_code.h"
 #include "interrupt.h"
-#include "io/output_file.h"
 #include "json_document.h"
 #include "outputs.h"
 #include "program.h"
@@ -24,6 +23,7 @@
 #include "scene/camera_frame.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -44,7 +44,7 @@ void tell(const Arguments& arguments, const SolverRun& run) {
   const std::string result =
       run.ran() ? fmt::format("{:.10g} in {:.3g} s", run.final_cost_independent, run.total_s)
                 : run.failed;
-  fmt::print(stderr, "{}:{}: {}\n", run.solver, run.config, result);
+  print_err("{}:{}: {}\n", run.solver, run.config, result);
 }
 
 // Interleaved, each turn beginning with another solver: A B C, B C A, ...
@@ -71,8 +71,7 @@ void make_bal(InputFile& input, bool own_lenses, bool quiet) {
   Problem& problem = input.problem;
   to_bal_cameras(problem).value();
   if (!quiet)
-    fmt::print(stderr,
-               "compared as a BAL file states it: each image has a lens f, k1, k2 of its own\n");
+    print_err("compared as a BAL file states it: each image has a lens f, k1, k2 of its own\n");
   std::vector<Camera> lenses;
   for (std::size_t j = 0; j < problem.num_images(); ++j) {
     lenses.push_back(problem.cameras[problem.image_camera[j]]);
@@ -88,10 +87,7 @@ void write_plot(const Arguments& arguments, const ComparisonRecord& record,
   for (const std::size_t i : median_runs(record.runs))
     if (const SolverRun& run = record.runs[i]; run.ran())
       curves.emplace_back(run.solver + " " + run.config, run.trace);
-  Result<OutputFile> file = OutputFile::create(arguments.plot, Compression::none);
-  if (!file.ok()) throw file.error();
-  file.value().write(cost_plot(title, curves, record.best));
-  file.value().commit().value();
+  write_text(cost_plot(title, curves, record.best), arguments.plot);
 }
 
 Json list_json(const std::vector<std::string>& items) {
@@ -124,19 +120,19 @@ Json document_of(const Arguments& arguments, const Json& input, const SolverList
 
 void print(const Arguments& arguments, const Problem& problem, const SolverList& solvers,
            const ComparisonRecord& record) {
-  fmt::print("{}: {}\n", arguments.in, counts_text(problem));
-  fmt::print(
+  print_out("{}: {}\n", arguments.in, counts_text(problem));
+  print_out(
       "{} thread{}; each solver ends after two accepted steps that decrease the cost by less than "
       "{:g} of it, {} steps or {:g} s\n",
       record.threads, record.threads == 1 ? "" : "s", arguments.limits.tolerance,
       arguments.limits.max_iterations, arguments.limits.time_s);
   if (arguments.limits.refinement.given())
-    fmt::print("held: {}\n",
-               held_text(refinement_of(arguments.limits.refinement, problem).value(), problem));
-  fmt::print("best cost {:.10g}\n\n{}", record.best, comparison_text(record));
-  if (arguments.steps) fmt::print("\n{}\n", steps_table(record));
+    print_out("held: {}\n",
+              held_text(refinement_of(arguments.limits.refinement, problem).value(), problem));
+  print_out("best cost {:.10g}\n\n{}", record.best, Lines{comparison_text(record)});
+  if (arguments.steps) print_out("\n{}\n", Lines{steps_table(record)});
   for (const MissingSolver& solver : solvers.missing)
-    fmt::print("not here: {}: {}\n", solver.name, solver.how);
+    print_out("not here: {}: {}\n", solver.name, solver.how);
 }
 
 int run(const Arguments& arguments) {

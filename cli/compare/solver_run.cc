@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "exit_code.h"
 #include "json_document.h"
 #include "program.h"
 #include "scene/camera_frame.h"
@@ -243,8 +244,8 @@ SolverRun run_solver(const SolverProgram& solver, const RunSetting& setting) {
     const ProgramOutcome outcome =
         run_program(own ? sheaf_words(solver, setting) : peer_words(solver, setting), variables,
                     setting.scratch, setting.kill_after_s, setting.stop);
-    // Sheaf ends with 130 at its time limit, its best state written.
-    if (!own || outcome.exit_code != 130) run.failed = outcome.failure();
+    // Sheaf's best state is written at its time limit.
+    if (!own || outcome.exit_code != kExitTimeLimit) run.failed = outcome.failure();
     if (!run.ran()) return run;
     if (own) {
       take_sheaf(Json::parse(std::ifstream(json)), run);

@@ -10,6 +10,7 @@
 #include "options/scene_options.h"
 #include "outputs.h"
 #include "sheaf/io.h"
+#include "terminal.h"
 #include "timer.h"
 
 namespace sheaf {
@@ -65,14 +66,17 @@ std::vector<BoundOption> options_of(PhotometricSceneArguments& arguments) {
 }
 
 int generate_photometric(const PhotometricSceneOptions& options, const std::string& out,
-                         const std::string& truth, const std::string& json) {
+                         const std::string& truth, const std::string& json, Interrupt& interrupt) {
   const Timer total;
-  check_outputs({{"--json", json}});
+  check_outputs({{.option = "OUT", .path = out, .folder = true},
+                 {.option = "--truth", .path = truth, .folder = true},
+                 {"--json", json}});
   PhotometricScene made = generate(options).value();
+  interrupt.begin_write();
   if (!truth.empty()) write_folder(std::move(made.truth), truth);
   write_folder(std::move(made.start), out);
-  fmt::print("{}: {} images of {} x {} pixels, {} points\n", out, options.images, options.width,
-             options.height, options.points);
+  print_out("{}: {} images of {} x {} pixels, {} points\n", out, options.images, options.width,
+            options.height, options.points);
   if (!json.empty()) write_json(document_of(options, out, truth, total.seconds()), json);
   return 0;
 }

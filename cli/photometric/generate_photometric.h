@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "interrupt.h"
 #include "options/option_field.h"
 #include "sheaf/photometric.h"
 
@@ -20,6 +21,6 @@ std::vector<BoundOption> options_of(PhotometricSceneArguments& arguments);
 
 /// Writes the scene into folders; returns the exit code.
 int generate_photometric(const PhotometricSceneOptions& options, const std::string& out,
-                         const std::string& truth, const std::string& json);
+                         const std::string& truth, const std::string& json, Interrupt& interrupt);
 
 }  // namespace sheaf

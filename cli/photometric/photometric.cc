@@ -12,6 +12,7 @@
 #include "photometric/photometric_outputs.h"
 #include "progress.h"
 #include "sheaf/sheaf.h"
+#include "terminal.h"
 #include "timer.h"
 #include "verb.h"
 
@@ -55,7 +56,8 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
-  PhotometricOutputs outputs(arguments.outputs, arguments.common.json);
+  PhotometricOutputs outputs(arguments.outputs, arguments.common.json,
+                             {arguments.in, arguments.photometric.read.images.string()});
   PhotometricFolder folder = read_photometric(arguments.in, arguments.photometric.read).value();
   std::optional<PoseErrors> before, after;
   if (!folder.given_poses.empty()) before = pose_errors(folder);
@@ -78,18 +80,18 @@ int run(Arguments& arguments) {
   const PhotometricDetails details = examine_photometric(problem, options).value();
   if (summary.solve.usable()) outputs.write(folder, details, options);
   const double write_s = writing.seconds();
-  fmt::print("{}: {} images, {} points\n", arguments.in, problem.images.size(),
-             problem.num_points());
-  for (const std::string& note : folder.notes) fmt::print("note        {}\n", note);
-  fmt::print("{}", summary_text(summary, details));
+  print_out("{}: {} images, {} points\n", arguments.in, problem.images.size(),
+            problem.num_points());
+  for (const std::string& note : folder.notes) print_out("note        {}\n", note);
+  print_text(summary_text(summary, details));
   if (before)
-    fmt::print("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
-               before->rotation_rad, after->rotation_rad, before->center, after->center);
+    print_out("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
+              before->rotation_rad, after->rotation_rad, before->center, after->center);
   for (std::size_t i = 0; i < problem.brightness.size(); ++i)
-    fmt::print("image {:<5} a {:.4f}, b {:.3f}\n", i, problem.brightness[i].a,
-               problem.brightness[i].b);
+    print_out("image {:<5} a {:.4f}, b {:.3f}\n", i, problem.brightness[i].a,
+              problem.brightness[i].b);
   if (!outputs.pictures().empty())
-    fmt::print("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
+    print_out("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
   if (!arguments.common.json.empty()) {
     const PhotometricRecord record{
         arguments.in,       folder.format, options_json(options_of(arguments.photometric)),

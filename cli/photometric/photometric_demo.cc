@@ -6,6 +6,7 @@
 
 #include "errors_document.h"
 #include "sheaf/io.h"
+#include "terminal.h"
 #include "timer.h"
 
 namespace sheaf {
@@ -31,21 +32,21 @@ PhotometricDemo run_photometric_demo(std::uint64_t seed, int threads, const Stop
 
 void tell(const PhotometricDemo& demo) {
   const PhotometricSceneOptions& o = demo.scene;
-  fmt::print(
+  print_out(
       "\nThe same from pixels: {} images of {} x {}, {} patches of 4 x 4 pixels and no features;\n"
       "{} grey levels of noise, brightness off by up to {:.0f} %, the start by {} px.\n\n",
       o.images, o.width, o.height, o.points, o.noise_grey, 100 * o.brightness, o.start_px);
   const auto line = [](const char* what, double a, double b) {
-    fmt::print("{:<28} {:>12.6g} {:>12.6g}\n", what, a, b);
+    print_out("{:<28} {:>12.6g} {:>12.6g}\n", what, a, b);
   };
-  fmt::print("{:<28} {:>12} {:>12}\n", "rms, then median errors", "start", "refined");
+  print_out("{:<28} {:>12} {:>12}\n", "rms, then median errors", "start", "refined");
   line("rms (grey levels)", demo.summary.initial_rms_grey, demo.summary.final_rms_grey);
   line("rotations (rad)", demo.before.rotation_error_rad.median,
        demo.after.rotation_error_rad.median);
   line("camera centres", demo.before.center_error.median, demo.after.center_error.median);
   line("points", demo.before.point_error.median, demo.after.point_error.median);
-  fmt::print("\n{} steps in {:.3f} s: {}.\n", demo.summary.solve.iterations.size() - 1,
-             demo.seconds, demo.summary.solve.words);
+  print_out("\n{} steps in {:.3f} s: {}.\n", demo.summary.solve.iterations.size() - 1, demo.seconds,
+            demo.summary.solve.words);
 }
 
 Json photometric_demo_json(const PhotometricDemo& demo) {

@@ -34,14 +34,14 @@ std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments) {
 }
 
 PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& arguments,
-                                       const std::string& json)
+                                       const std::string& json,
+                                       const std::vector<std::string>& inputs)
     : arguments_(arguments) {
-  std::string probe;
-  if (!arguments_.pictures.empty()) {
-    make_folder(arguments_.pictures).value();
-    probe = std::filesystem::path(arguments_.pictures) / "worst-patches.png";
-  }
-  check_outputs({{"--ply", arguments_.ply}, {"--pictures", probe}, {"--json", json}});
+  check_outputs({{.option = "-o", .path = arguments_.out, .folder = true},
+                 {.option = "--pictures", .path = arguments_.pictures, .folder = true},
+                 {"--ply", arguments_.ply},
+                 {"--json", json}},
+                inputs);
 }
 
 void PhotometricOutputs::remember(const PhotometricProblem& start,
@@ -54,10 +54,7 @@ void PhotometricOutputs::remember(const PhotometricProblem& start,
 void PhotometricOutputs::write(const PhotometricFolder& folder, const PhotometricDetails& details,
                                const PhotometricOptions& options) {
   const PhotometricProblem& problem = folder.problem;
-  if (!arguments_.out.empty()) {
-    write_photometric(folder, arguments_.out).value();
-    write_photometric_details(details, problem.num_points(), arguments_.out).value();
-  }
+  if (!arguments_.out.empty()) write_photometric(folder, arguments_.out, &details).value();
   if (start_)
     write_ply(*start_, coloured_cloud_of(folder, details.seen).value(), arguments_.ply).value();
   if (!stage_) return;

@@ -22,8 +22,9 @@ std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments);
 /// Holds what outputs need of the start until the result is there. Errors are thrown.
 class PhotometricOutputs {
  public:
-  /// Before anything is computed; makes the folder of the pictures.
-  PhotometricOutputs(const PhotometricOutputArguments& arguments, const std::string& json);
+  /// Before anything is computed. inputs: what no output may be.
+  PhotometricOutputs(const PhotometricOutputArguments& arguments, const std::string& json,
+                     const std::vector<std::string>& inputs);
 
   void remember(const PhotometricProblem& start, const PhotometricOptions& options);
 

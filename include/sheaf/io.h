@@ -115,10 +115,12 @@ struct PhotometricReadOptions {
 Result<PhotometricFolder> read_photometric(const std::filesystem::path& path,
                                            const PhotometricReadOptions& options = {});
 
-/// Writes the state in the folder's format into a folder, which is made where it is not there;
-/// images that were read are copied (not those of a COLMAP model), others become PNG of 8 bits.
-/// Errors: ErrorCode::unwritable_output.
-Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path);
+/// Writes the state in the folder's format into a folder, which is made where it is not there and
+/// else replaced whole, other files in it kept; images that were read are copied (not those of a
+/// COLMAP model), others become PNG of 8 bits. `details` go along (see below). Errors:
+/// ErrorCode::unwritable_output.
+Result<void> write_photometric(const PhotometricFolder& folder, const std::filesystem::path& path,
+                               const PhotometricDetails* details = nullptr);
 
 /// Writes what `examine_photometric` found into a folder that is there:
 ///   visibility.txt  a line per point: the images that its patch is seen in; its host is not listed

@@ -109,6 +109,10 @@ std::vector<Camera> cameras_from(nb::handle given) {
 }
 
 nb::object camera_object(const Camera& camera) {
+  if (static_cast<std::size_t>(camera.model) >= kCameraModels)
+    throw Error(ErrorCode::usage, "found the model number " +
+                                      std::to_string(static_cast<int>(camera.model)) +
+                                      ", expected less than " + std::to_string(kCameraModels));
   const nb::object type = nb::module_::import_("sheaf._records").attr("Camera");
   return type(nb::cast(std::string(to_string(camera.model))),
               array_of(camera.parameters.data(), {parameter_count(camera.model)}), camera.width_px,

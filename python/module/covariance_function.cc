@@ -142,7 +142,6 @@ nb::object covariance_of(const ProblemHandle& held, const nb::kwargs& keywords) 
   std::optional<Covariance> found;
   {
     const nb::gil_scoped_release released;
-    validate(use.problem()).value();
     if (constraints) {
       placed = use.problem();
       place_survey(*placed, *constraints, options.fixed).value();

@@ -36,7 +36,6 @@ ProblemHandle read_problem(const fs::path& path) {
 void write_problem(const ProblemHandle& held, const fs::path& path, const std::string& format) {
   const ReadUse use(held);
   const nb::gil_scoped_release released;
-  validate(use.problem()).value();
   write(use.problem(), path, {.format = format}).value();
 }
 
@@ -63,7 +62,6 @@ nb::object clean_problem(const ProblemHandle& held, const nb::kwargs& keywords) 
   CleanRecord record;
   {
     const nb::gil_scoped_release released;
-    validate(use.problem()).value();
     if (options.any()) record = clean(use.problem(), options);
   }
   return record_of(record);

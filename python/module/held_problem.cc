@@ -5,6 +5,23 @@
 #include <utility>
 
 namespace sheaf {
+namespace {
+
+/// That lenses are of a model that there is, which is an enumerator to the library.
+void check_models(const Problem& problem) {
+  for (std::size_t i = 0; i < problem.cameras.size(); ++i)
+    if (static_cast<std::size_t>(problem.cameras[i].model) >= kCameraModels)
+      throw Error(ErrorCode::usage, "camera " + std::to_string(i) + " has the model number " +
+                                        std::to_string(static_cast<int>(problem.cameras[i].model)) +
+                                        ", expected less than " + std::to_string(kCameraModels));
+}
+
+void check_valid(const Problem& problem) {
+  check_models(problem);
+  validate(problem).value();
+}
+
+}  // namespace
 
 std::size_t HeldProblem::views() const {
   const std::lock_guard lock(mutex_);
@@ -46,9 +63,10 @@ ViewPin::~ViewPin() {
   --held_->views_;
 }
 
-ReadUse::ReadUse(ProblemHandle held) : held_(std::move(held)) {
+ReadUse::ReadUse(ProblemHandle held, Validity validity) : held_(std::move(held)) {
   const std::lock_guard lock(held_->mutex_);
   if (held_->writes_) throw Error(ErrorCode::usage, "the problem is being changed by another call");
+  if (validity == Validity::asked) check_valid(held_->problem);
   ++held_->readers_;
 }
 
@@ -57,10 +75,11 @@ ReadUse::~ReadUse() {
   --held_->readers_;
 }
 
-WriteUse::WriteUse(ProblemHandle held) : held_(std::move(held)) {
+WriteUse::WriteUse(ProblemHandle held, Validity validity) : held_(std::move(held)) {
   const std::lock_guard lock(held_->mutex_);
   if (held_->writes_ || held_->readers_ > 0)
     throw Error(ErrorCode::usage, "the problem is in use by another call");
+  validity == Validity::asked ? check_valid(held_->problem) : check_models(held_->problem);
   held_->writes_ = true;
 }
 

@@ -61,10 +61,15 @@ class ViewPin {
   ProblemHandle held_;
 };
 
-/// A call that looks at the problem. Throws Error (usage) while another one changes it.
+/// Whether a call asks that the problem is valid. Views are written to by whoever has them, so that
+/// it need not be; what only passes it on does not look.
+enum class Validity { asked, any };
+
+/// A call that looks at the problem. Throws Error (usage) while another one changes it, and where
+/// it is not valid.
 class ReadUse {
  public:
-  explicit ReadUse(ProblemHandle held);
+  explicit ReadUse(ProblemHandle held, Validity validity = Validity::asked);
   ~ReadUse();
   ReadUse(const ReadUse&) = delete;
   ReadUse& operator=(const ReadUse&) = delete;
@@ -74,10 +79,11 @@ class ReadUse {
   ProblemHandle held_;
 };
 
-/// A call that changes the problem. Throws Error (usage) while another one uses it.
+/// A call that changes the problem. Throws Error (usage) while another one uses it, and where it is
+/// not valid.
 class WriteUse {
  public:
-  explicit WriteUse(ProblemHandle held);
+  explicit WriteUse(ProblemHandle held, Validity validity = Validity::asked);
   ~WriteUse();
   WriteUse(const WriteUse&) = delete;
   WriteUse& operator=(const WriteUse&) = delete;

@@ -37,7 +37,7 @@ void bind_command(nb::module_& module) {
         for (std::string& text : texts) arguments.push_back(text.data());
         arguments.push_back(nullptr);
         const nb::gil_scoped_release released;
-        return run_command_line(static_cast<int>(texts.size()), arguments.data(), all_verbs());
+        return run_command_line(static_cast<int>(texts.size()), arguments.data(), all_verbs);
       },
       nb::arg("words"),
       "The command, as in a shell: words[0] is its name. Returns the exit code. It takes signals "

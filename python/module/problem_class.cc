@@ -93,7 +93,7 @@ nb::object names_of(const HeldProblem& held) {
 }
 
 ProblemHandle copy_of(const ProblemHandle& held) {
-  const ReadUse use(held);
+  const ReadUse use(held, Validity::any);
   auto out = std::make_shared<HeldProblem>();
   out->problem = use.problem();
   out->format = held->format;

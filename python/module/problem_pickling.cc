@@ -169,7 +169,7 @@ std::shared_ptr<const SourceFiles> unpack_source(Unpacker& unpack) {
 }
 
 nb::bytes pack_problem(const ProblemHandle& held) {
-  const ReadUse use(held);
+  const ReadUse use(held, Validity::any);
   const Problem& p = use.problem();
   std::string bytes;
   {

@@ -66,7 +66,6 @@ nb::list check_problem(const ProblemHandle& held, int threads) {
   std::vector<Finding> findings;
   {
     const nb::gil_scoped_release released;
-    validate(use.problem()).value();
     findings = check(use.problem());
     if (auto weak = weak_lenses(use.problem(), threads_here(threads)))
       findings.push_back(*std::move(weak));

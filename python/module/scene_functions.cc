@@ -61,7 +61,6 @@ nb::object perturb_problem(const ProblemHandle& held, const nb::kwargs& keywords
   NoiseRecord record;
   {
     const nb::gil_scoped_release released;
-    validate(use.problem()).value();
     record = perturb(use.problem(), options).value();
   }
   const Normalization& n = record.normalization;

@@ -62,7 +62,10 @@ TermLoss loss_from(const std::string& text) {
   return {loss.kind, loss.scale_px};
 }
 
-std::uint32_t parameter_named(const Problem& p, std::uint32_t camera, const std::string& name) {
+std::uint32_t parameter_named(const ProblemHandle& held, std::uint32_t camera,
+                              const std::string& name) {
+  const WriteUse use(held, Validity::any);
+  const Problem& p = use.problem();
   if (camera >= p.cameras.size())
     throw Error(ErrorCode::usage, "camera: found " + std::to_string(camera) +
                                       ", expected less than " + std::to_string(p.cameras.size()));
@@ -76,7 +79,7 @@ std::uint32_t parameter_named(const Problem& p, std::uint32_t camera, const std:
 /// Adds a term, or leaves the problem as it was where that is not valid.
 template <class Term>
 void add(const ProblemHandle& held, std::vector<Term>& list, Term term) {
-  const WriteUse use(held);
+  const WriteUse use(held, Validity::any);
   list.push_back(std::move(term));
   if (const auto wrong = wrong_terms(use.problem())) {
     list.pop_back();
@@ -128,14 +131,13 @@ void add_relative_pose_prior(const ProblemHandle& held, std::uint32_t first, std
 void add_parameter_prior(const ProblemHandle& held, std::uint32_t camera, const std::string& name,
                          double value, double sigma, const std::string& loss) {
   add(held, held->problem.terms.parameters,
-      ParameterPrior{camera, parameter_named(held->problem, camera, name), value, sigma,
-                     loss_from(loss)});
+      ParameterPrior{camera, parameter_named(held, camera, name), value, sigma, loss_from(loss)});
 }
 
 void add_parameter_bound(const ProblemHandle& held, std::uint32_t camera, const std::string& name,
                          double lower, double upper) {
   add(held, held->problem.terms.bounds,
-      ParameterBound{camera, parameter_named(held->problem, camera, name), lower, upper});
+      ParameterBound{camera, parameter_named(held, camera, name), lower, upper});
 }
 
 void add_point_prior(const ProblemHandle& held, std::uint32_t point, nb::handle position,
@@ -266,7 +268,7 @@ void bind_lens_and_point_priors(ProblemClass& problem) {
       .def(
           "clear_priors",
           [](const ProblemHandle& held) {
-            const WriteUse use(held);
+            const WriteUse use(held, Validity::any);
             use.problem().terms = {};
           },
           "Takes out all priors and bounds.")

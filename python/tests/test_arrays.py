@@ -159,6 +159,41 @@ class Views(unittest.TestCase):
         del view
         self.assertGreater(problem.clean(max_error=5).observations, 0)
 
+    def test_what_is_written_into_them_is_checked_by_each_call(self):
+        def image(problem):
+            problem.observation_image[7] = 99
+
+        def lens(problem):
+            problem.image_camera[2] = 50
+
+        def model(problem):
+            problem.cameras["model"][1] = 200
+
+        other = scenes.small()[0]
+        calls = [
+            sheaf.solve, sheaf.check, sheaf.covariance, sheaf.perturb, sheaf.Problem.evaluate,
+            sheaf.Problem.to_bal, sheaf.Problem.clean, sheaf.Problem.without_bal_cameras,
+            lambda p: sheaf.align(p, other), lambda p: sheaf.align(other, p),
+            lambda p: sheaf.evaluate(p, other), lambda p: p.lost_in("nvm"),
+            lambda p: p.write("nowhere"),
+        ]
+        for spoil, words in [
+            (image, "observation 7 names image 99 of 8"),
+            (lens, "image 2 names camera 50 of 8"),
+            (model, "camera 1 has the model number 200"),
+        ]:
+            problem = scenes.small()[0]
+            spoil(problem)
+            for call in calls:
+                with self.subTest(words), self.assertRaisesRegex(sheaf.Error, words):
+                    call(problem)
+            self.assertEqual(problem.copy().num_points, problem.num_points)
+            pickle.dumps(problem)
+        with self.assertRaisesRegex(sheaf.Error, "found the model number 200"):
+            problem.camera(1)
+        with self.assertRaisesRegex(sheaf.Error, "camera 1 has the model number 200"):
+            problem.add_parameter_prior(1, "f", 1.0, 1.0)
+
     def test_setting_one_of_the_same_size_is_in_place(self):
         problem = scenes.small()[0]
         view = problem.points

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/output_folder.h"
 #include "io/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/problem.h"
@@ -39,8 +40,10 @@ Result<Problem> parse_colmap(const ColmapFiles& files);
 /// for a problem that the form cannot hold.
 Result<ColmapFiles> format_colmap(const Problem& problem, bool text);
 
-/// Writes them, making the folder where there is none. Refuses a folder with files of a model that
-/// these would not replace: the two together would be misread.
-Result<void> write_colmap(const ColmapFiles& files, const std::filesystem::path& folder);
+/// Puts them into a folder of outputs. Refuses a folder with files of a model that these would not
+/// replace: the two together would be misread.
+Result<void> put_colmap(const ColmapFiles& files, OutputFolder& out);
+/// The same of a problem. Errors: usage, for one that is not valid or that the form cannot hold.
+Result<void> put_model(const Problem& problem, bool text, OutputFolder& out);
 
 }  // namespace sheaf

@@ -5,7 +5,7 @@
 
 #include "io/colmap_form.h"
 #include "io/colmap_rigs.h"
-#include "io/output_file.h"
+#include "io/output_folder.h"
 #include "scene/camera_frame.h"
 #include "scene/point_errors.h"
 #include "scene/rigs.h"
@@ -13,8 +13,6 @@
 
 namespace sheaf {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::uint8_t kGrey = 128;
 
@@ -149,42 +147,27 @@ Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
   return files;
 }
 
-Result<void> write_colmap(const ColmapFiles& given, const fs::path& folder) {
-  ColmapFiles files = given;
-  files.folder = (folder / "").string();
-  const auto refuse = [&](const std::string& why) {
-    return Error(ErrorCode::unwritable_output, folder.string() + ": cannot be written: " + why);
+Result<void> put_colmap(const ColmapFiles& files, OutputFolder& out) {
+  const auto refuse = [&](const std::string& why) { return unwritable(out.shown(), why); };
+  const auto name_of = [](const char* stem, bool text) {
+    return std::string(stem) + (text ? ".txt" : ".bin");
   };
-  std::error_code error;
-  const bool there = fs::is_directory(folder, error);
-  const std::vector<std::pair<std::string, const std::string*>> parts = {
-      {files.name("cameras"), &files.cameras},
-      {files.name("images"), &files.images},
-      {files.name("points3D"), &files.points},
-      {files.name("rigs"), &files.rigs},
-      {files.name("frames"), &files.frames}};
-  ColmapFiles other;
-  other.text = !files.text;
-  other.folder = files.folder;
-  for (const char* stem : {"cameras", "images", "points3D", "rigs", "frames"})
-    if (there && fs::exists(other.name(stem), error))
-      return refuse("it holds " + other.name(stem) +
-                    ", which would be mixed up with what is written");
-  for (const auto& [name, bytes] : parts)
-    if (there && bytes->empty() && fs::exists(name, error))
+  for (const auto& [stem, bytes] : {std::pair{"cameras", &files.cameras},
+                                    {"images", &files.images},
+                                    {"points3D", &files.points},
+                                    {"rigs", &files.rigs},
+                                    {"frames", &files.frames}}) {
+    const std::string name = name_of(stem, files.text), other = name_of(stem, !files.text);
+    if (out.had(other))
+      return refuse("it holds " + other + ", which would be mixed up with what is written");
+    if (bytes->empty() && out.had(name))
       return refuse("it holds " + name + " of a model with rigs, which this one has not");
-  if (!there && !fs::create_directory(folder, error))
-    return refuse(error ? error.message() : "it is there and no folder");
-  std::vector<OutputFile> outputs;
-  for (const auto& [name, bytes] : parts) {
     if (bytes->empty()) continue;
-    Result<OutputFile> out = OutputFile::create(name, Compression::none);
-    if (!out.ok()) return out.error();
-    outputs.push_back(std::move(out).value());
-    outputs.back().write(*bytes);
+    Result<OutputFile> file = out.create_file(name);
+    if (!file.ok()) return file.error();
+    file.value().write(*bytes);
+    if (Result<void> done = file.value().commit(); !done.ok()) return done;
   }
-  for (OutputFile& out : outputs)
-    if (Result<void> done = out.commit(); !done.ok()) return done;
   return {};
 }
 

@@ -44,9 +44,13 @@ Result<void> find_intrinsics(const FolderFiles& files, const std::optional<Pinho
 /// The folder as a whole, not yet validated.
 Result<PhotometricFolder> read_direct(const FolderFiles& files,
                                       const PhotometricReadOptions& options);
-Result<void> write_direct(const PhotometricFolder& folder, const std::filesystem::path& path);
+Result<void> write_direct(const PhotometricFolder& folder, OutputFolder& out);
+
+/// visibility.txt and sigma.txt.
+Result<void> write_details(const PhotometricDetails& details, std::size_t points,
+                           OutputFolder& out);
 
 /// brightness.txt and intrinsics.txt, as every format writes them.
-Result<void> write_looks(const PhotometricProblem& problem, const std::filesystem::path& path);
+Result<void> write_looks(const PhotometricProblem& problem, OutputFolder& out);
 
 }  // namespace sheaf

@@ -12,14 +12,14 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Grey levels as the nearest of 8 bits.
-Result<void> write_image(const GreyImage& image, const fs::path& to) {
+Result<void> write_image(const GreyImage& image, OutputFolder& out, const fs::path& name) {
   Raster raster{image.width, image.height, 1, 8, {}};
   for (float grey : image.pixels)
     raster.samples.push_back(
         static_cast<std::uint16_t>(std::clamp(std::lround(grey), long{0}, long{255})));
   const Result<std::string> bytes = encode_png(raster);
   if (!bytes.ok()) return bytes.error();
-  return write_bytes(to, bytes.value());
+  return write_bytes(out, name, bytes.value());
 }
 
 void put_poses(const PhotometricFolder& folder, TextBuffer& text) {
@@ -64,24 +64,23 @@ void put_measurements(const PhotometricProblem& problem, TextBuffer& text) {
 
 }  // namespace
 
-Result<void> write_looks(const PhotometricProblem& problem, const fs::path& path) {
+Result<void> write_looks(const PhotometricProblem& problem, OutputFolder& out) {
   const auto put_intrinsics = [&](TextBuffer& text) {
     const Pinhole& k = problem.camera;
     text.put(k.fx, ' '), text.put(k.fy, ' '), text.put(k.cx, ' '), text.put(k.cy, '\n');
   };
-  if (auto r = write_text_file(path / "intrinsics.txt", put_intrinsics); !r.ok()) return r;
+  if (auto r = write_text_file(out, "intrinsics.txt", put_intrinsics); !r.ok()) return r;
   if (problem.brightness.empty()) return {};
-  return write_text_file(path / "brightness.txt", [&](TextBuffer& text) {
+  return write_text_file(out, "brightness.txt", [&](TextBuffer& text) {
     for (const Brightness& of : problem.brightness) text.put(of.a, ' '), text.put(of.b, '\n');
   });
 }
 
-Result<void> write_direct(const PhotometricFolder& folder, const fs::path& path) {
-  if (auto r = make_folder(path); !r.ok()) return r;
+Result<void> write_direct(const PhotometricFolder& folder, OutputFolder& out) {
   const PhotometricProblem& problem = folder.problem;
-  if (auto r = write_text_file(path / "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
+  if (auto r = write_text_file(out, "poses.txt", [&](auto& t) { put_poses(folder, t); }); !r.ok())
     return r;
-  if (auto r = write_text_file(path / "points.txt", [&](auto& t) { put_points(problem, t); });
+  if (auto r = write_text_file(out, "points.txt", [&](auto& t) { put_points(problem, t); });
       !r.ok())
     return r;
   const auto put_hosts = [&](TextBuffer& text) {
@@ -91,17 +90,17 @@ Result<void> write_direct(const PhotometricFolder& folder, const fs::path& path)
     }
   };
   if (problem.has_hosts())
-    if (auto r = write_text_file(path / "hosts.txt", put_hosts); !r.ok()) return r;
-  if (auto r = write_looks(problem, path); !r.ok()) return r;
+    if (auto r = write_text_file(out, "hosts.txt", put_hosts); !r.ok()) return r;
+  if (auto r = write_looks(problem, out); !r.ok()) return r;
   if (problem.num_measurements() > 0)
-    if (auto r = write_text_file(path / "measurements.txt",
+    if (auto r = write_text_file(out, "measurements.txt",
                                  [&](TextBuffer& text) { put_measurements(problem, text); });
         !r.ok())
       return r;
   for (std::size_t i = 0; i < problem.images.size(); ++i) {
-    const fs::path to = path / (std::to_string(i) + ".png");
-    if (auto r = folder.files.empty() ? write_image(problem.images[i], to)
-                                      : duplicate_file(folder.files[i], to);
+    const fs::path name = std::to_string(i) + ".png";
+    if (auto r = folder.files.empty() ? write_image(problem.images[i], out, name)
+                                      : duplicate_file(folder.files[i], out, name);
         !r.ok())
       return r;
   }

@@ -12,6 +12,7 @@
 #include "io/libmv.h"
 #include "io/nvm.h"
 #include "io/output_file.h"
+#include "io/output_folder.h"
 #include "io/ply.h"
 #include "io/sha256.h"
 #include "scene/camera_frame.h"
@@ -128,9 +129,10 @@ Error refused(const fs::path& path, const Error& error) {
 }
 
 Result<void> write_folder(const Problem& problem, const fs::path& path, bool text) {
-  const Result<ColmapFiles> files = format_colmap(problem, text);
-  if (!files.ok()) return refused(path, files.error());
-  return write_colmap(files.value(), path);
+  Result<OutputFolder> out = OutputFolder::create(path);
+  if (!out.ok()) return out.error();
+  if (auto r = put_model(problem, text, out.value()); !r.ok()) return r;
+  return out.value().commit();
 }
 
 /// BAL needs one of each; a file that could not be read back is not written.
@@ -229,6 +231,14 @@ Result<void> write(const Problem& given, const fs::path& path, const WriteOption
       "Sheaf writes bal, colmap, colmap-text, bundler, nvm, libmv and ply, not '" + format + "'");
 }
 
+Result<void> put_model(const Problem& given, bool text, OutputFolder& out) {
+  if (Result<void> valid = validate(given); !valid.ok()) return valid;
+  Problem moved;
+  const Result<ColmapFiles> files = format_colmap(placed(given, moved), text);
+  if (!files.ok()) return refused(out.shown(), files.error());
+  return put_colmap(files.value(), out);
+}
+
 Result<OutputFile> create_output(const fs::path& path) {
   Compression compression;
   strip_compression(path, compression);
@@ -239,10 +249,12 @@ Result<void> check_writable(const fs::path& path, bool model) {
   // Opening a pipe would wait for its reader, and closing it would end what that reads.
   std::error_code ignored;
   if (fs::is_fifo(path, ignored)) return {};
-  fs::path probe = path;
-  if (model && fs::is_directory(path, ignored)) probe = path / "cameras";
-  if (model && !path.empty() && !path.has_filename()) probe = path.parent_path();
-  Result<OutputFile> out = OutputFile::create(probe, Compression::none);
+  if (model && (fs::is_directory(path, ignored) || (!path.empty() && !path.has_filename()))) {
+    const Result<OutputFolder> out = OutputFolder::create(path);
+    if (!out.ok()) return out.error();
+    return {};
+  }
+  Result<OutputFile> out = OutputFile::create(path, Compression::none);
   if (!out.ok()) return out.error();
   return {};
 }

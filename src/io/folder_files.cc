@@ -53,19 +53,25 @@ Result<void> make_folder(const fs::path& folder) {
                folder.string() + ": the folder cannot be made: " + error.message());
 }
 
-Result<void> write_bytes(const fs::path& path, const std::string& bytes) {
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
+Result<OutputFolder> make_output_folder(const fs::path& target) {
+  const fs::path around = behind_links(target).parent_path();
+  if (!around.empty())
+    if (Result<void> made = make_folder(around); !made.ok()) return made.error();
+  return OutputFolder::create(target);
+}
+
+Result<void> write_bytes(OutputFolder& folder, const fs::path& name, const std::string& bytes) {
+  Result<OutputFile> out = folder.create_file(name);
   if (!out.ok()) return out.error();
   out.value().write(bytes);
   return out.value().commit();
 }
 
-Result<void> duplicate_file(const fs::path& from, const fs::path& to) {
-  std::error_code same;
-  if (fs::equivalent(from, to, same)) return {};
+Result<void> duplicate_file(const fs::path& from, OutputFolder& folder, const fs::path& name) {
+  if (folder.is_there(name, from)) return {};
   const Result<std::string> bytes = bytes_of(from);
   if (!bytes.ok()) return bytes.error();
-  return write_bytes(to, bytes.value());
+  return write_bytes(folder, name, bytes.value());
 }
 
 }  // namespace sheaf

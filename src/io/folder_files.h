@@ -7,6 +7,7 @@
 #include <string>
 
 #include "image/grey.h"
+#include "io/output_folder.h"
 #include "io/text_buffer.h"
 #include "sheaf/error.h"
 #include "sheaf/photometric.h"
@@ -33,14 +34,19 @@ Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name);
 
 /// Errors of writing: unwritable_output. Folders are made where they are not there.
 Result<void> make_folder(const std::filesystem::path& folder);
-Result<void> write_bytes(const std::filesystem::path& path, const std::string& bytes);
-/// Nothing happens where both are one file.
-Result<void> duplicate_file(const std::filesystem::path& from, const std::filesystem::path& to);
+/// A folder to write into, with the folders that it lies in.
+Result<OutputFolder> make_output_folder(const std::filesystem::path& target);
+Result<void> write_bytes(OutputFolder& folder, const std::filesystem::path& name,
+                         const std::string& bytes);
+/// A file that is what the folder has under this name stays.
+Result<void> duplicate_file(const std::filesystem::path& from, OutputFolder& folder,
+                            const std::filesystem::path& name);
 
 /// A text made by `put(TextBuffer&)`.
 template <class Put>
-Result<void> write_text_file(const std::filesystem::path& path, const Put& put) {
-  Result<OutputFile> out = OutputFile::create(path, Compression::none);
+Result<void> write_text_file(OutputFolder& folder, const std::filesystem::path& name,
+                             const Put& put) {
+  Result<OutputFile> out = folder.create_file(name);
   if (!out.ok()) return out.error();
   TextBuffer text(out.value());
   put(text);

@@ -7,70 +7,101 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
-#include <cstring>
+#include <charconv>
+#include <string_view>
 #include <utility>
+
+#include "io/partial.h"
 
 namespace sheaf {
 namespace {
 
-constexpr std::size_t kLongestName = 200;  // of NAME in the partial's name: file systems allow 255
 constexpr std::size_t kCompressedBytes = 1 << 16;
 constexpr int kGzipLevel = 4;  // on BAL text three times as fast as 6 and 4% larger
 constexpr std::size_t kLargestPiece = 1 << 30;  // zlib and bzip2 count in 32 bits
 
-Error unwritable(const std::filesystem::path& path, const std::string& why) {
-  return Error(ErrorCode::unwritable_output, path.string() + ": cannot be written: " + why);
+namespace fs = std::filesystem;
+
+/// Mode, owner and group of the file that is replaced. Who may not give files away keeps them, and
+/// then no right to act as their owner goes along.
+void take_attributes(int fd, const struct stat& of) {
+  struct stat own;
+  if (::fstat(fd, &own) != 0) return;
+  mode_t mode = of.st_mode & 07777;
+  if (own.st_uid != of.st_uid || own.st_gid != of.st_gid) {
+    if (::fchown(fd, of.st_uid, of.st_gid) != 0) {
+      mode &= 0777;
+      (void)!::fchown(fd, static_cast<uid_t>(-1), of.st_gid);
+    }
+  }
+  (void)::fchmod(fd, mode);
 }
 
-Error unwritable(const std::filesystem::path& path, int error) {
-  return unwritable(path, std::strerror(error));
-}
-
-std::filesystem::path partial_beside(const std::filesystem::path& target) {
-  static std::atomic<unsigned> serial = 0;
-  const std::string name = target.filename().string().substr(0, kLongestName);
-  return target.parent_path() /
-         (name + ".partial-" + std::to_string(::getpid()) + "-" + std::to_string(serial++));
+/// The descriptor that a name like /dev/stdout or /dev/fd/3 stands for; -1 for other names.
+int named_descriptor(const fs::path& target) {
+  const std::string name = target.lexically_normal().string();
+  if (name == "/dev/stdout") return STDOUT_FILENO;
+  if (name == "/dev/stderr") return STDERR_FILENO;
+  for (const std::string_view folder : {"/dev/fd/", "/proc/self/fd/"}) {
+    if (!name.starts_with(folder)) continue;
+    const char *begin = name.data() + folder.size(), *end = name.data() + name.size();
+    int fd = -1;
+    const auto [stop, error] = std::from_chars(begin, end, fd);
+    if (error == std::errc() && stop == end) return fd;
+  }
+  return -1;
 }
 
 }  // namespace
 
-Result<OutputFile> OutputFile::create(const std::filesystem::path& target,
-                                      Compression compression) {
+Result<OutputFile> OutputFile::create(const fs::path& target, Compression compression) {
   OutputFile out;
   out.compression_ = compression;
-  out.target_ = target;
+  out.shown_ = target;
   if (target.empty()) return unwritable(target, "the name is empty");
   struct stat status;
   const bool exists = ::stat(target.c_str(), &status) == 0;
+  if (!exists && errno != ENOENT) return unwritable(target, errno);
   if (exists && S_ISDIR(status.st_mode)) return unwritable(target, "it is a directory");
-  if (exists && ::access(target.c_str(), W_OK) != 0) return unwritable(target, errno);
-  if (exists && !S_ISREG(status.st_mode)) {
+  const int open = named_descriptor(target);
+  if (exists && open < 0 && ::access(target.c_str(), W_OK) != 0) return unwritable(target, errno);
+  if (open >= 0) {
+    out.fd_ = ::fcntl(open, F_DUPFD_CLOEXEC, 0);
+  } else if (exists && !S_ISREG(status.st_mode)) {
     out.fd_ = ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
-    // Through a symbolic link, so that the file it names is replaced and not the link.
-    std::error_code ignored;
-    const std::filesystem::path real = std::filesystem::canonical(target, ignored);
-    if (exists && !ignored) out.target_ = real;
-    out.partial_ = partial_beside(out.target_);
-    out.fd_ = ::open(out.partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC,
-                     exists ? status.st_mode & 07777 : 0666);
+    out.target_ = behind_links(target);
+    Result<Partial> partial = claim_partial_file(out.target_, exists ? 0600 : 0666, target);
+    if (!partial.ok()) return partial.error();
+    out.partial_ = std::move(partial.value().path);
+    out.fd_ = partial.value().fd;
+    remember_partial(out.partial_);
+    if (exists) take_attributes(out.fd_, status);
   }
-  if (out.fd_ < 0) {
-    const int error = errno;
-    out.partial_.clear();
-    return unwritable(target, error);
-  }
-  if (exists && !out.partial_.empty()) (void)::fchmod(out.fd_, status.st_mode & 07777);
+  if (out.fd_ < 0) return unwritable(target, errno);
   out.open_compressor();
   return out;
 }
 
+Result<OutputFile> OutputFile::create_within(const fs::path& path, const fs::path& shown,
+                                             const fs::path& replaced) {
+  OutputFile out;
+  out.shown_ = shown;
+  struct stat status;
+  const bool exists = ::stat(replaced.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  out.fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (out.fd_ < 0) return unwritable(shown, errno);
+  out.new_ = path;
+  if (exists) take_attributes(out.fd_, status);
+  return out;
+}
+
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : target_(std::move(other.target_)),
+    : shown_(std::move(other.shown_)),
+      target_(std::move(other.target_)),
       partial_(std::exchange(other.partial_, {})),
+      new_(std::exchange(other.new_, {})),
       fd_(std::exchange(other.fd_, -1)),
       compression_(other.compression_),
       zlib_(std::move(other.zlib_)),
@@ -80,8 +111,11 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
 
 OutputFile::~OutputFile() {
   close_compressor();
+  // Unlinked first: the lock must outlast the name.
+  if (!partial_.empty()) forget_partial(partial_);
+  for (const fs::path* path : {&partial_, &new_})
+    if (!path->empty()) ::unlink(path->c_str());
   if (fd_ >= 0) ::close(fd_);
-  if (!partial_.empty()) ::unlink(partial_.c_str());
 }
 
 void OutputFile::open_compressor() {
@@ -162,21 +196,28 @@ void OutputFile::write_raw(const char* data, std::size_t size) {
 }
 
 void OutputFile::fail(int error) {
-  if (!error_) error_ = unwritable(target_, error);
+  if (!error_) error_ = unwritable(shown_, error);
 }
 
 Result<void> OutputFile::commit() {
   if (!error_ && compression_ != Compression::none) compress(nullptr, 0, true);
   // Some file systems tell of a full disk only here.
+  if (const int error = error_ || fd_ < 0 ? 0 : sync_file(fd_)) fail(error);
+  if (error_) return *error_;
+  if (Result<void> done = replace(); !done.ok()) return done;
+  // Of what is whole and in its place; pipes and devices may tell here what went wrong.
   if (fd_ >= 0 && ::close(std::exchange(fd_, -1)) != 0) fail(errno);
   if (error_) return *error_;
-  if (!partial_.empty()) {
-    if (::rename(partial_.c_str(), target_.c_str()) != 0) {
-      fail(errno);
-      return *error_;
-    }
-    partial_.clear();
-  }
+  return {};
+}
+
+Result<void> OutputFile::replace() {
+  new_.clear();
+  if (partial_.empty()) return {};
+  forget_partial(partial_);  // the name may be another process's as soon as it is free
+  if (::rename(partial_.c_str(), target_.c_str()) != 0) return unwritable(shown_, errno);
+  partial_.clear();
+  if (const int error = sync_folder(target_.parent_path())) return unwritable(shown_, error);
   return {};
 }
 

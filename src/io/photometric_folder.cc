@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "io/colmap.h"
 #include "io/direct_folder.h"
 #include "io/model_images.h"
 #include "io/rgbd_folder.h"
@@ -92,11 +93,21 @@ Result<PhotometricFolder> read_photometric(const fs::path& path,
   }
 }
 
-Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path) {
-  if (folder.format.starts_with("rgbd")) return write_rgbd(folder, path);
-  if (folder.format.starts_with("colmap"))
-    return write(model_with_state(folder), path, {.format = folder.format});
-  return write_direct(folder, path);
+Result<void> write_photometric(const PhotometricFolder& folder, const fs::path& path,
+                               const PhotometricDetails* details) {
+  Result<OutputFolder> out = make_output_folder(path);
+  if (!out.ok()) return out.error();
+  const auto put_state = [&] {
+    if (folder.format.starts_with("rgbd")) return write_rgbd(folder, out.value());
+    if (folder.format.starts_with("colmap"))
+      return put_model(model_with_state(folder), folder.format == "colmap-text", out.value());
+    return write_direct(folder, out.value());
+  };
+  if (auto r = put_state(); !r.ok()) return r;
+  if (details != nullptr)
+    if (auto r = write_details(*details, folder.problem.num_points(), out.value()); !r.ok())
+      return r;
+  return out.value().commit();
 }
 
 }  // namespace sheaf

@@ -39,6 +39,6 @@ constexpr double kSameMoment_s = 0.02;
 /// The folder as a whole, not yet validated. Points are those of hosts.txt, or are chosen.
 Result<PhotometricFolder> read_rgbd(const FolderFiles& files,
                                     const PhotometricReadOptions& options);
-Result<void> write_rgbd(const PhotometricFolder& folder, const std::filesystem::path& path);
+Result<void> write_rgbd(const PhotometricFolder& folder, OutputFolder& out);
 
 }  // namespace sheaf

@@ -42,36 +42,34 @@ fs::path name_of(const PhotometricFolder& folder, const fs::path& file, std::siz
 
 /// Copies of the files, and their list by time.
 Result<void> write_files(const PhotometricFolder& folder, const std::vector<fs::path>& files,
-                         const fs::path& path, const char* list) {
+                         OutputFolder& out, const char* list) {
   std::string lines;
   for (std::size_t i = 0; i < files.size(); ++i) {
     const fs::path name = name_of(folder, files[i], i);
-    if (auto r = make_folder((path / name).parent_path()); !r.ok()) return r;
-    if (auto r = duplicate_file(files[i], path / name); !r.ok()) return r;
+    if (auto r = duplicate_file(files[i], out, name); !r.ok()) return r;
     char time[32];
     lines.append(time, std::to_chars(time, time + sizeof time, folder.times[i]).ptr);
     lines += " " + name.string() + "\n";
   }
-  return list == nullptr ? Result<void>() : write_bytes(path / list, lines);
+  return list == nullptr ? Result<void>() : write_bytes(out, list, lines);
 }
 
 }  // namespace
 
-Result<void> write_rgbd(const PhotometricFolder& folder, const fs::path& path) {
+Result<void> write_rgbd(const PhotometricFolder& folder, OutputFolder& out) {
   const bool timed = folder.format == "rgbd";
-  if (auto r = make_folder(path); !r.ok()) return r;
-  if (auto r = write_text_file(path / (timed ? "groundtruth.txt" : "pose.txt"),
+  if (auto r = write_text_file(out, timed ? "groundtruth.txt" : "pose.txt",
                                [&](TextBuffer& t) { put_trajectory(folder, timed, t); });
       !r.ok())
     return r;
   if (auto r =
-          write_text_file(path / "hosts.txt", [&](TextBuffer& t) { put_hosts(folder.problem, t); });
+          write_text_file(out, "hosts.txt", [&](TextBuffer& t) { put_hosts(folder.problem, t); });
       !r.ok())
     return r;
-  if (auto r = write_looks(folder.problem, path); !r.ok()) return r;
-  if (auto r = write_files(folder, folder.files, path, timed ? "rgb.txt" : nullptr); !r.ok())
+  if (auto r = write_looks(folder.problem, out); !r.ok()) return r;
+  if (auto r = write_files(folder, folder.files, out, timed ? "rgb.txt" : nullptr); !r.ok())
     return r;
-  return write_files(folder, folder.depth_files, path, timed ? "depth.txt" : nullptr);
+  return write_files(folder, folder.depth_files, out, timed ? "depth.txt" : nullptr);
 }
 
 }  // namespace sheaf

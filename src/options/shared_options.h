@@ -35,7 +35,7 @@ struct SharedFields {
                      .unit = "s",
                      .range = above(0),
                      .help = "stop after this long, set-up included, write the best state and exit "
-                             "with 130"});
+                             "with 7"});
   }
   /// `how` says what is done about a forecast over the limit.
   static Field memory_limit(const std::string& how) {

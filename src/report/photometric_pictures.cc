@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "image/png.h"
-#include "io/output_file.h"
+#include "io/folder_files.h"
 #include "report/patch_sheet.h"
 #include "report/residual_map.h"
 
@@ -14,24 +14,23 @@ namespace {
 
 constexpr std::size_t kRows = 6;
 
-Result<void> write_png(const Image& image, const std::filesystem::path& path) {
+Result<void> write_png(const Image& image, OutputFolder& folder, const std::string& name) {
   const Result<std::string> bytes = encode_png(image);
   if (!bytes.ok()) return bytes.error();
-  Result<OutputFile> file = OutputFile::create(path, Compression::none);
-  if (!file.ok()) return file.error();
-  file.value().write(bytes.value());
-  return file.value().commit();
+  return write_bytes(folder, name, bytes.value());
 }
 
 }  // namespace
 
 Result<std::vector<std::string>> write_pictures(const PatchComparison& comparison,
                                                 const std::vector<GreyImage>& images,
-                                                const std::filesystem::path& folder) {
+                                                const std::filesystem::path& path) {
+  Result<OutputFolder> folder = OutputFolder::create(path);
+  if (!folder.ok()) return folder.error();
   std::vector<std::string> names;
   const auto put = [&](const Image& image, const std::string& name) {
     names.push_back(name);
-    return write_png(image, folder / name);
+    return write_png(image, folder.value(), name);
   };
   const std::vector<PatchFit> fits = rank_patches(comparison);
   const std::size_t rows = std::min(kRows, fits.size());
@@ -52,6 +51,7 @@ Result<std::vector<std::string>> write_pictures(const PatchComparison& compariso
     if (auto done = put(map, "residuals-" + std::to_string(j) + ".png"); !done.ok())
       return done.error();
   }
+  if (auto done = folder.value().commit(); !done.ok()) return done.error();
   return names;
 }
 

@@ -37,8 +37,12 @@ std::vector<std::string> TemporaryFolder::names() const {
   return names;
 }
 
-RunningCommand::RunningCommand(const std::vector<std::string>& arguments, const fs::path& folder) {
-  std::vector<std::string> words = {SHEAF_COMMAND};
+RunningCommand::RunningCommand(const std::vector<std::string>& arguments, const fs::path& folder)
+    : RunningCommand(command_path(), arguments, folder) {}
+
+RunningCommand::RunningCommand(const std::string& program,
+                               const std::vector<std::string>& arguments, const fs::path& folder) {
+  std::vector<std::string> words = {program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -95,6 +99,13 @@ Outcome RunningCommand::wait() {
 Outcome run_command(const std::vector<std::string>& arguments, const fs::path& folder) {
   return RunningCommand(arguments, folder).wait();
 }
+
+Outcome run_program(const std::string& program, const std::vector<std::string>& arguments,
+                    const fs::path& folder) {
+  return RunningCommand(program, arguments, folder).wait();
+}
+
+std::string command_path() { return SHEAF_COMMAND; }
 
 std::string contents_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

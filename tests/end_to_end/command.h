@@ -38,6 +38,9 @@ struct Outcome {
 class RunningCommand {
  public:
   RunningCommand(const std::vector<std::string>& arguments, const std::filesystem::path& folder);
+  /// Another program in its place.
+  RunningCommand(const std::string& program, const std::vector<std::string>& arguments,
+                 const std::filesystem::path& folder);
   ~RunningCommand();
   RunningCommand(const RunningCommand&) = delete;
   RunningCommand& operator=(const RunningCommand&) = delete;
@@ -57,6 +60,9 @@ class RunningCommand {
 };
 
 Outcome run_command(const std::vector<std::string>& arguments, const std::filesystem::path& folder);
+Outcome run_program(const std::string& program, const std::vector<std::string>& arguments,
+                    const std::filesystem::path& folder);
+std::string command_path();
 
 std::string contents_of(const std::filesystem::path& path);
 void write_text(const std::filesystem::path& path, const std::string& text);

@@ -67,6 +67,50 @@ TEST_F(Outputs, AreNoFilesOfAnInputFolder) {
   EXPECT_EQ(beside.exit_code, 0) << beside.err;
 }
 
+TEST_F(Outputs, OfImagesAreNoInputs) {
+  ASSERT_EQ(run({"generate", "images", "--photometric", "--points", "50"}).exit_code, 0);
+  fs::create_directory_symlink("images", folder_ / "link");
+  expect_refused({"photometric", "images", "-o", "link/"}, "-o names link/");
+  expect_refused({"photometric", "link", "-o", "images"}, "-o names images");
+  expect_refused({"photometric", "images", "--json", "link/0.png"}, "--json names link/0.png");
+  expect_refused({"photometric", "images", "--ply", "images/poses.txt"},
+                 "--ply names images/poses");
+  expect_refused({"photometric", "images", "--pictures", "./images"}, "--pictures names ./images");
+  expect_refused({"photometric", "images", "--images", "model", "--json", "model/images.bin"},
+                 "--json names model/images.bin");
+}
+
+// A model of the other form, or a file, is in the way: known before anything is computed.
+TEST_F(Outputs, FoldersThatCannotBeReplacedAreKnownBeforeTheSolve) {
+  const auto expect_in_the_way = [&](const std::string& out, const std::string& words) {
+    const Outcome outcome = run({"solve", "model", "-o", out});
+    EXPECT_EQ(outcome.exit_code, 6) << words;
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.err.find("iteration"), std::string::npos) << outcome.err;
+  };
+  ASSERT_EQ(run({"convert", "model", "text", "--format", "colmap-text"}).exit_code, 0);
+  expect_in_the_way("text", "cameras.txt");
+  fs::create_directory(folder_ / "rigs");
+  write_text(folder_ / "rigs/rigs.bin", "of another model");
+  expect_in_the_way("rigs/", "rigs.bin");
+  write_text(folder_ / "file", "precious");
+  expect_in_the_way("file", "no folder");
+  EXPECT_EQ(contents_of(folder_ / "file"), "precious");
+}
+
+// Into a folder that is there: all of the model, and what else is in it stays.
+TEST_F(Outputs, OntoAFolderReplaceItWhole) {
+  fs::create_directory(folder_ / "out");
+  write_text(folder_ / "out/notes.txt", "mine");
+  for (int i = 0; i < 2; ++i) {
+    const Outcome outcome = run({"solve", "model", "-o", "out/", "--max-iterations", "2"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(contents_of(folder_ / "out/notes.txt"), "mine");
+    EXPECT_EQ(run({"info", "out"}).exit_code, 0);
+  }
+  EXPECT_EQ(folder_.names(), (std::vector<std::string>{"in.txt", "model", "out"}));
+}
+
 TEST_F(Outputs, ThatNothingNamesAreRefused) {
   expect_refused({"solve", "in.txt", "-o", ""}, "found an empty text");
   expect_refused({"solve", "in.txt", "--json", ""}, "found an empty text");

@@ -96,7 +96,7 @@ TEST_F(PhotometricCommand, OptionsWork) {
                  "--tolerance", "1e-4",  "--motion",     "0.1"})
                 .exit_code,
             0);
-  EXPECT_EQ(run({"photometric", "scene", "--time-limit", "1e-9"}).exit_code, 130);
+  EXPECT_EQ(run({"photometric", "scene", "--time-limit", "1e-9"}).exit_code, 7);
 }
 
 TEST_F(PhotometricCommand, IsAnchoredToMeasuredPositions) {

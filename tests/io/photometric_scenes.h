@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
@@ -38,7 +39,7 @@ inline FolderFiles files_of(const MemoryFolder& folder) {
 inline void write_folder(const MemoryFolder& folder, const std::filesystem::path& path) {
   for (const auto& [name, bytes] : folder) {
     make_folder((path / name).parent_path()).value();
-    write_bytes(path / name, bytes).value();
+    std::ofstream(path / name, std::ios::binary) << bytes;
   }
 }
 
