@@ -12,11 +12,10 @@
 
 #include "constraints_option.h"
 #include "covariance_document.h"
+#include "covariance_fields.h"
 #include "interrupt.h"
 #include "json_document.h"
-#include "options/loss_option.h"
 #include "options/refinement.h"
-#include "options/shared_options.h"
 #include "outputs.h"
 #include "projection_option.h"
 #include "rigs_option.h"
@@ -141,7 +140,6 @@ int run(const Arguments& arguments) {
 
 std::vector<BoundOption> options_of(Arguments& a) {
   using F = FieldsOf<Arguments>;
-  using C = FieldsOf<CovarianceOptions>;
   const auto own_options = bound<Arguments>(
       {F::list(&Arguments::points,
                {.name = "points",
@@ -159,37 +157,7 @@ std::vector<BoundOption> options_of(Arguments& a) {
        F::text(&Arguments::csv,
                {.name = "csv", .placeholder = "FILE", .help = "a line for each parameter"})},
       a);
-  const auto of_covariance = bound<CovarianceOptions>(
-      {C::choice(&CovarianceOptions::gauge,
-                 {{Gauge::automatic, "auto", "data where these fix the scene, else free"},
-                  {Gauge::data, "data", "nothing is added; refused where something is left free"},
-                  {Gauge::free_centres, "free", "the trace over camera centres is least"},
-                  {Gauge::free_points, "free-points", "the trace over points is least"},
-                  {Gauge::first_two, "first-two",
-                   "the first pose and one coordinate of the second are exact"}},
-                 {.name = "gauge", .help = "what stands for place, turn and scale"}),
-       C::real(&CovarianceOptions::sigma, {.name = "sigma",
-                                           .placeholder = "S",
-                                           .unit = "px",
-                                           .range = {.lowest = 0},
-                                           .help = "of a residual; 0: from the residuals"}),
-       loss_field<CovarianceOptions>(&CovarianceOptions::loss, {"pixels", false, false},
-                                     {.name = "loss", .help = "that the solve ended with"}),
-       SharedFields<CovarianceOptions>::memory_limit(
-           "solve for what --poses and --points name by conjugate gradients, else refuse (exit 5)"),
-       C::choice(&CovarianceOptions::solver,
-                 {{CovarianceSolver::automatic, "auto", "factor where it fits"},
-                  {CovarianceSolver::factor, "factor", "all at once"},
-                  {CovarianceSolver::conjugate_gradients, "conjugate-gradients",
-                   "a solve for each parameter; --poses and --points must name a few"}},
-                 {.name = "solver", .help = "how entries of the inverse are found"}),
-       C::flag(&CovarianceOptions::conditional,
-               {.name = "conditional", .help = "points with cameras held"}),
-       C::flag(&CovarianceOptions::observations,
-               {.name = "observations",
-                .help = "redundancy and standardised residual of each observation"})},
-      a.covariance);
-  return joined({of_covariance, own_options,
+  return joined({bound(covariance_fields(), a.covariance), own_options,
                  own(bound(refinement_fields("what has no covariance"), a.refinement))});
 }
 

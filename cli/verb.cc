@@ -6,6 +6,12 @@
 
 namespace sheaf {
 
+std::vector<Verb> all_verbs() {
+  return {solve_verb(),       info_verb(),     check_verb(),      convert_verb(),   perturb_verb(),
+          evaluate_verb(),    align_verb(),    covariance_verb(), calibrate_verb(), compare_verb(),
+          photometric_verb(), generate_verb(), demo_verb()};
+}
+
 std::vector<BoundOption> options_of(CommonOptions& options) {
   using F = FieldsOf<CommonOptions>;
   static const OptionTable<CommonOptions> kTable = {

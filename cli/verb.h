@@ -33,6 +33,8 @@ Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();
 Verb demo_verb();
+/// All of them, in the order of the command's help.
+std::vector<Verb> all_verbs();
 
 /// What every verb takes.
 struct CommonOptions {

@@ -10,7 +10,7 @@ if ! command -v clang-format-14 >/dev/null; then
   echo "format: clang-format-14 is not here: NOT CHECKED"
   exit 0
 fi
-mapfile -t files < <(find include src cli tests bench fuzz examples -name '*.cc' -o -name '*.h' | sort)
+mapfile -t files < <(find include src cli python tests bench fuzz examples -name '*.cc' -o -name '*.h' | sort)
 if [ "${1:-}" = --fix ]; then
   clang-format-14 -i "${files[@]}"
 else

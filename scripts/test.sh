@@ -14,6 +14,7 @@ if [ "${1:-}" = --preset ]; then
   shift 2
 fi
 scripts/install-deps.sh
+scripts/python-env.sh
 scripts/build.sh "$preset"
 echo "test: real data is looked for in ${SHEAF_DATA:-data}"
 exec ctest --test-dir "build/$preset" -j "$(nproc)" --output-on-failure "$@"

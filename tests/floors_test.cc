@@ -72,10 +72,10 @@ std::vector<SourceFile> read_sources(const std::vector<std::string>& folders,
 }
 
 std::vector<SourceFile> engine_sources() {
-  return read_sources({"include", "src", "cli"}, {".h", ".cc"});
+  return read_sources({"include", "src", "cli", "python"}, {".h", ".cc"});
 }
 std::vector<SourceFile> all_sources() {
-  return read_sources({"include", "src", "cli", "tests", "bench", "fuzz", "examples"},
+  return read_sources({"include", "src", "cli", "python", "tests", "bench", "fuzz", "examples"},
                       {".h", ".cc"});
 }
 
@@ -279,8 +279,8 @@ TEST(Floors, LibraryNeitherPrintsNorExits) {
 }
 
 TEST(Floors, NoBuildForThisMachineOnly) {
-  std::vector<SourceFile> recipes =
-      read_sources({"cmake", "cli", "tests", "bench", "fuzz", "examples"}, {".txt", ".cmake"});
+  std::vector<SourceFile> recipes = read_sources(
+      {"cmake", "cli", "python", "tests", "bench", "fuzz", "examples"}, {".txt", ".cmake"});
   for (const char* name : {"CMakeLists.txt", "CMakePresets.json"}) {
     recipes.push_back({name, read_lines(kRoot / name)});
   }
