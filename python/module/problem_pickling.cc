@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bindings.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 
 namespace sheaf {
 namespace {
