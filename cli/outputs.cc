@@ -9,7 +9,7 @@
 #include "io/folder_files.h"
 #include "io/output_file.h"
 #include "io/output_folder.h"
-#include "io/source_files.h"
+#include "scene/source_files.h"
 #include "sheaf/error.h"
 #include "sheaf/io.h"
 #include "terminal.h"
