@@ -177,11 +177,10 @@ void print_cameras(const Problem& problem, const std::vector<CameraStatistics>& 
     const std::vector<std::string_view> names = parameter_names(camera.model);
     for (std::size_t k = 0; k < names.size(); ++k)
       parameters.push_back(fmt::format("{} {:.6g}", names[k], camera.parameters[k]));
-    print_out(
-        "camera {:<4} {}{}, {} images, mean error {:.6g} px: {}\n", camera_id(problem, c),
-        to_string(camera.model),
-        camera.width_px > 0 ? fmt::format(" {} x {}", camera.width_px, camera.height_px) : "",
-        statistics[c].images, statistics[c].mean_error_px, fmt::join(parameters, ", "));
+    print_out("camera {:<4} {}{}, {} images, mean error {:.6g} px: {}\n", camera_id(problem, c),
+              to_string(camera.model),
+              camera.width_px > 0 ? fmt::format(" {} x {}", camera.width_px, camera.height_px) : "",
+              statistics[c].images, statistics[c].mean_error_px, fmt::join(parameters, ", "));
   }
   if (problem.cameras.size() > kShown)
     print_out("            and {} more\n", problem.cameras.size() - kShown);
@@ -215,27 +214,27 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   const std::string packed = input.compression == "none" ? "" : ", " + input.compression;
   print_out("{}: {}\n", path, counts_text(input.problem));
   print_out("file        {}{}, {} bytes, read in {:.3f} s\n", input.format, packed, input.bytes,
-             input.read_s);
+            input.read_s);
   for (const std::string& note : input.notes) print_out("note        {}\n", note);
   print_out("registered  {} images, mean {:.6g} observations ({:.0f} to {:.0f}, median {:.6g})\n",
-             input.problem.num_images(), mean_observations(input.problem), images.min, images.max,
-             images.median);
+            input.problem.num_images(), mean_observations(input.problem), images.min, images.max,
+            images.median);
   print_out("points      {}, mean track length {:.3f} ({:.0f} to {:.0f} observations)\n",
-             input.problem.num_points(), statistics.mean_track, statistics.track.min,
-             statistics.track.max);
+            input.problem.num_points(), statistics.mean_track, statistics.track.min,
+            statistics.track.max);
   print_out("error       mean reprojection error {:.6g} px, rms {:.6g} px\n",
-             statistics.mean_error_px, evaluation.rms_px);
+            statistics.mean_error_px, evaluation.rms_px);
   print_out("cost        {:.9e}\n", evaluation.cost);
   print_out("behind      {} observations behind their camera\n", evaluation.behind.size());
   if (!evaluation.not_finite.empty())
     print_out("not finite  {} observations, not in the cost\n", evaluation.not_finite.size());
   print_out("lenses      {}; focal {:.6g} to {:.6g} px, median {:.6g}\n",
-             lenses_text(input.problem), focal.min, focal.max, focal.median);
+            lenses_text(input.problem), focal.min, focal.max, focal.median);
   print_cameras(input.problem, camera_statistics(input.problem));
   print_rigs(input.problem);
   print_norms(input.problem);
   print_out("memory      {} bytes for the problem, {} bytes at most for the process\n",
-             size_bytes(input.problem), peak_resident_bytes());
+            size_bytes(input.problem), peak_resident_bytes());
   print_histogram(statistics);
 }
 
