@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -47,6 +48,12 @@ class Packer {
       for (const Element& element : list) put(element);
     }
   }
+  template <class First, class Second>
+  void put(const std::pair<First, Second>& pair) {
+    put(pair.first);
+    put(pair.second);
+  }
+  void put(const std::filesystem::path& path) { put(path.string()); }
   void put(const GaussianPrior& prior);
   void put(const GaussianPrior::Block& block);
 
@@ -97,6 +104,16 @@ class Unpacker {
       for (Element& element : list) take(element);
     }
   }
+  template <class First, class Second>
+  void take(std::pair<First, Second>& pair) {
+    take(pair.first);
+    take(pair.second);
+  }
+  void take(std::filesystem::path& path) {
+    std::string text;
+    take(text);
+    path = text;
+  }
   void take(GaussianPrior& prior);
   void take(GaussianPrior::Block& block);
 
@@ -139,8 +156,11 @@ void pass_metadata(Archive& archive, M& m) {
 
 template <class Archive, class S>
 void pass_source(Archive& archive, S& s) {
-  archive(s.format, s.cameras, s.images, s.points, s.rigs, s.frames, s.listed_images,
-          s.nvm_distortion, s.nvm_measured, s.nvm_centres, s.libmv_space);
+  archive(s.format, s.unknown_parameters, s.camera_names, s.feature_scales, s.root_members,
+          s.image_members, s.camera_members, s.pose_ids, s.unplaced_views, s.normalised_xy,
+          s.beside);
+  archive(s.cameras, s.images, s.points, s.rigs, s.frames, s.listed_images, s.nvm_distortion,
+          s.nvm_measured, s.centres, s.libmv_space);
 }
 
 void pack_source(Packer& pack, const SourceFiles* source) {

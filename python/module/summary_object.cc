@@ -158,6 +158,9 @@ nb::dict fields_of(const Summary& s) {
   out["forecast_bytes"] = s.forecast_bytes;
   out["setup_s"] = s.setup_s;
   out["solve_s"] = s.solve_s;
+  out["resumed_after"] = s.resumed_after;
+  out["checkpoints"] = s.checkpoints;
+  out["checkpoint_failure"] = s.checkpoint_failure;
   out["behind_camera_before"] = array_of(s.behind_camera_before);
   out["behind_camera_after"] = array_of(s.behind_camera_after);
   out["rejected_observations"] = array_of(s.rejected_observations);

@@ -45,6 +45,9 @@ class Summary:
     forecast_bytes: int  #: predicted peak resident size of the process
     setup_s: float
     solve_s: float
+    resumed_after: int  #: the step after which a checkpoint was gone on from; -1: none was
+    checkpoints: int  #: written by this run
+    checkpoint_failure: str  #: why one could not be; "": none failed
     behind_camera_before: Numbers  #: observations
     behind_camera_after: Numbers
     rejected_observations: Numbers  #: left out (cheirality="hold-out")
