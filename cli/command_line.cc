@@ -5,10 +5,13 @@
 
 #include "command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <new>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "exit_code.h"
@@ -98,6 +101,8 @@ std::string name_of(const CLI::App& app) {
   return verbs.empty() ? "sheaf" : "sheaf " + verbs.front()->get_name();
 }
 
+constexpr std::string_view kOutOfMemory = "sheaf: out of memory\n";
+
 int usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const bool asked_for_help = error.get_exit_code() == 0;
   if (asked_for_help) return app.exit(error);  // --help and --version, on stdout
@@ -155,7 +160,13 @@ int finish(int exit_code) {
 int run_command_line(int argc, char** argv, std::vector<Verb> (*verbs)()) {
   watch_signals();
   guard_streams();
-  return finish(run(argc, argv, verbs()));
+  try {
+    return finish(run(argc, argv, verbs()));
+  } catch (const std::bad_alloc&) {
+    // Not even for a message: this one takes no memory.
+    (void)!::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
+    return static_cast<int>(ErrorCode::memory_limit);
+  }
 }
 
 }  // namespace sheaf

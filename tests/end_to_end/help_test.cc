@@ -52,6 +52,7 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--ply",
                     "--solver",
                     "--pictures",
+                    "--log",
                     "--memory-limit",
                     "--intrinsics",
                     "--interpolation",
@@ -94,7 +95,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "covariance")
     options.insert({"--gauge", "--sigma", "--loss", "--conditional", "--observations", "--points",
                     "--memory-limit", "--csv", "--fix", "--refine", "--rigs", "--constraints"});
-  if (verb == "solve") options.insert("--sigmas");
+  if (verb == "solve") options.insert({"--sigmas", "--log"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
