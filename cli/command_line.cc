@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
@@ -16,6 +18,7 @@
 
 #include "exit_code.h"
 #include "interrupt.h"
+#include "io/partial.h"
 #include "options/options_page.h"
 #include "sheaf/error.h"
 #include "terminal.h"
@@ -103,6 +106,27 @@ std::string name_of(const CLI::App& app) {
 
 constexpr std::string_view kOutOfMemory = "sheaf: out of memory\n";
 
+/// Takes no memory.
+int tell_out_of_memory() {
+  (void)!::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
+  return static_cast<int>(ErrorCode::memory_limit);
+}
+
+/// Functions of libraries that promise not to throw allocate all the same: an allocation that fails
+/// in one of them ends the command as any other does.
+std::atomic<bool> allocation_failed = false;
+
+[[noreturn]] void end_without_memory() {
+  if (!allocation_failed) std::abort();
+  unlink_partial_files();
+  ::_exit(tell_out_of_memory());
+}
+
+[[noreturn]] void note_failed_allocation() {
+  allocation_failed = true;
+  throw std::bad_alloc();
+}
+
 int usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const bool asked_for_help = error.get_exit_code() == 0;
   if (asked_for_help) return app.exit(error);  // --help and --version, on stdout
@@ -160,12 +184,12 @@ int finish(int exit_code) {
 int run_command_line(int argc, char** argv, std::vector<Verb> (*verbs)()) {
   watch_signals();
   guard_streams();
+  std::set_new_handler(note_failed_allocation);
+  std::set_terminate(end_without_memory);
   try {
     return finish(run(argc, argv, verbs()));
   } catch (const std::bad_alloc&) {
-    // Not even for a message: this one takes no memory.
-    (void)!::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
-    return static_cast<int>(ErrorCode::memory_limit);
+    return tell_out_of_memory();
   }
 }
 
