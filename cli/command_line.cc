@@ -5,14 +5,20 @@
 
 #include "command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "exit_code.h"
 #include "interrupt.h"
+#include "io/partial.h"
 #include "options/options_page.h"
 #include "sheaf/error.h"
 #include "terminal.h"
@@ -98,6 +104,29 @@ std::string name_of(const CLI::App& app) {
   return verbs.empty() ? "sheaf" : "sheaf " + verbs.front()->get_name();
 }
 
+constexpr std::string_view kOutOfMemory = "sheaf: out of memory\n";
+
+/// Takes no memory.
+int tell_out_of_memory() {
+  (void)!::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
+  return static_cast<int>(ErrorCode::memory_limit);
+}
+
+/// Functions of libraries that promise not to throw allocate all the same: an allocation that fails
+/// in one of them ends the command as any other does.
+std::atomic<bool> allocation_failed = false;
+
+[[noreturn]] void end_without_memory() {
+  if (!allocation_failed) std::abort();
+  unlink_partial_files();
+  ::_exit(tell_out_of_memory());
+}
+
+[[noreturn]] void note_failed_allocation() {
+  allocation_failed = true;
+  throw std::bad_alloc();
+}
+
 int usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const bool asked_for_help = error.get_exit_code() == 0;
   if (asked_for_help) return app.exit(error);  // --help and --version, on stdout
@@ -155,7 +184,13 @@ int finish(int exit_code) {
 int run_command_line(int argc, char** argv, std::vector<Verb> (*verbs)()) {
   watch_signals();
   guard_streams();
-  return finish(run(argc, argv, verbs()));
+  std::set_new_handler(note_failed_allocation);
+  std::set_terminate(end_without_memory);
+  try {
+    return finish(run(argc, argv, verbs()));
+  } catch (const std::bad_alloc&) {
+    return tell_out_of_memory();
+  }
 }
 
 }  // namespace sheaf

@@ -15,6 +15,22 @@ namespace {
 
 constexpr std::size_t kMostListed = 1000;
 
+/// What a variant of options holds, as JSON has it.
+struct AsJson {
+  Json operator()(std::monostate) const { return {}; }
+  Json operator()(double value) const { return number(value); }
+  template <class Value>
+  Json operator()(const Value& value) const {
+    return value;
+  }
+};
+
+Json range_json(const Range& range) {
+  return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
+}
+
+}  // namespace
+
 Json iteration_json(const Iteration& it) {
   return {{"index", it.index},
           {"round", it.round},
@@ -34,22 +50,6 @@ Json iteration_json(const Iteration& it) {
           {"passes", it.passes},
           {"time_s", number(it.time_s)}};
 }
-
-/// What a variant of options holds, as JSON has it.
-struct AsJson {
-  Json operator()(std::monostate) const { return {}; }
-  Json operator()(double value) const { return number(value); }
-  template <class Value>
-  Json operator()(const Value& value) const {
-    return value;
-  }
-};
-
-Json range_json(const Range& range) {
-  return {{"min", number(range.min)}, {"median", number(range.median)}, {"max", number(range.max)}};
-}
-
-}  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 

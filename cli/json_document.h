@@ -30,6 +30,7 @@ Json statistics_json(const Statistics& statistics);
 Json scene_options_json(const SceneOptions& options);
 /// Key and value of each option that a verb has of its own.
 Json options_json(const std::vector<BoundOption>& options);
+Json iteration_json(const Iteration& iteration);
 Json iterations_json(const Summary& summary);
 Json changes_json(const Summary& summary);
 Json recoveries_json(const Summary& summary);

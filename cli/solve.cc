@@ -22,6 +22,7 @@
 #include "rigs_option.h"
 #include "scene/subset.h"
 #include "sheaf/sheaf.h"
+#include "step_log.h"
 #include "summary_text.h"
 #include "terminal.h"
 #include "timer.h"
@@ -35,7 +36,7 @@ struct Arguments {
   SolveArguments solve;
   RigsArguments rigs;
   ConstraintsArguments constraints;
-  std::string in, out, ply, sigmas;
+  std::string in, out, ply, sigmas, log;
 };
 
 // All but the observations, which are most of the memory while the solver needs its own.
@@ -146,8 +147,8 @@ bool agrees(const Summary& summary, const Evaluation& after, const Problem& prob
   return std::abs(cost - summary.final_plain_cost) <= kRounding * (cost + 1e-20);
 }
 
-SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt,
-                         Progress& progress) {
+SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt, Progress& progress,
+                         StepLog& log) {
   SolveOptions options = arguments.solve.options;
   options.threads = arguments.common.threads;
   options.lend_observations = true;
@@ -155,6 +156,7 @@ SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt,
   options.on_plan = [&](const Summary& summary) { progress.report_plan(summary); };
   options.on_iteration = [&](const Iteration& iteration) {
     progress.report(iteration);
+    log.step(iteration);
     return true;
   };
   return options;
@@ -196,7 +198,8 @@ int run(Arguments& arguments) {
                  {"--ply", arguments.ply},
                  {"--residuals", arguments.constraints.residuals},
                  {"--sigmas", arguments.sigmas},
-                 {"--checkpoint", arguments.solve.options.checkpoint}},
+                 {"--checkpoint", arguments.solve.options.checkpoint},
+                 {"--log", arguments.log}},
                 inputs_of(arguments));
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
@@ -210,7 +213,8 @@ int run(Arguments& arguments) {
   if (wants_json) record.before = evaluate(problem);
 
   Progress progress(arguments.common.quiet);
-  SolveOptions options = options_for(arguments, interrupt, progress);
+  StepLog log(arguments.log);
+  SolveOptions options = options_for(arguments, interrupt, progress, log);
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
   SurveyWork work{place_survey(arguments.constraints, problem, options.fixed)};
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
@@ -243,6 +247,7 @@ int run(Arguments& arguments) {
   if (summary.usable() && !arguments.out.empty())
     print_losses(write_format(problem, arguments.out), problem);
   if (sigmas.failed) throw *sigmas.failed;
+  log.end(summary);
   return exit_code_of(summary.termination);
 }
 
@@ -269,7 +274,8 @@ Verb solve_verb() {
                    F::text(&Arguments::sigmas,
                            {.name = "sigmas",
                             .placeholder = "FILE",
-                            .help = "how well the end is known, as JSON (docs/covariance.md)"})},
+                            .help = "how well the end is known, as JSON (docs/covariance.md)"}),
+                   F::text(&Arguments::log, log_of_steps())},
                   *a),
               own(options_of(a->solve)), options_of(a->rigs), options_of(a->constraints, true),
               options_of(a->common)});

@@ -43,6 +43,12 @@ OptionSpec ply_of_two_states() {
           .help = "write start (grey) and result (colour) as one PLY"};
 }
 
+OptionSpec log_of_steps() {
+  return {.name = "log",
+          .placeholder = "FILE",
+          .help = "write a line of JSON for each step as it is made, and one for the end"};
+}
+
 OptionSpec problem_in() {
   return {
       .name = "IN",

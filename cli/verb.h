@@ -52,6 +52,8 @@ std::vector<BoundOption> own(const std::vector<BoundOption>& options);
 
 /// A problem that is read.
 OptionSpec problem_in();
+/// --log of a solve.
+OptionSpec log_of_steps();
 /// --ply of two states of a problem.
 OptionSpec ply_of_two_states();
 /// --format of a problem that is written, and what it takes.

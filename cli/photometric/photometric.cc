@@ -12,6 +12,7 @@
 #include "photometric/photometric_outputs.h"
 #include "progress.h"
 #include "sheaf/sheaf.h"
+#include "step_log.h"
 #include "terminal.h"
 #include "timer.h"
 #include "verb.h"
@@ -56,6 +57,25 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
   return out;
 }
 
+// An image that shows no patch, nor holds one that another image shows, tells nothing and is told
+// nothing of.
+std::vector<std::string> images_without_patches(const PhotometricFolder& folder,
+                                                const PhotometricDetails& details) {
+  const PhotometricProblem& problem = folder.problem;
+  std::vector<bool> shows(problem.images.size(), false);
+  for (const PatchSight& sight : details.seen) {
+    shows[sight.image] = true;
+    if (problem.has_hosts()) shows[problem.host[sight.point]] = true;
+  }
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < shows.size(); ++i)
+    if (!shows[i])
+      out.push_back(i < folder.files.size()
+                        ? fmt::format("{} ({})", i, folder.files[i].filename().string())
+                        : fmt::format("{}", i));
+  return out;
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
@@ -66,11 +86,13 @@ int run(Arguments& arguments) {
   if (!folder.given_poses.empty()) before = pose_errors(folder);
   PhotometricProblem& problem = folder.problem;
   Progress progress(arguments.common.quiet);
+  StepLog log(arguments.outputs.log);
   PhotometricOptions options = arguments.photometric.options;
   options.threads = arguments.common.threads;
   options.stop = interrupt.token();
   options.on_iteration = [&](const Iteration& iteration) {
     progress.report(iteration);
+    log.step(iteration);
     return true;
   };
   outputs.remember(problem, options);
@@ -86,6 +108,8 @@ int run(Arguments& arguments) {
   print_out("{}: {} images, {} points\n", arguments.in, problem.images.size(),
             problem.num_points());
   for (const std::string& note : folder.notes) print_out("note        {}\n", note);
+  for (const std::string& image : images_without_patches(folder, details))
+    print_out("note        no patch is seen in image {}: nothing holds its pose\n", image);
   print_text(summary_text(summary, details));
   if (before)
     print_out("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
@@ -102,6 +126,7 @@ int run(Arguments& arguments) {
         total.seconds(),    before,        after};
     write_json(photometric_json(record, summary, details, problem), arguments.common.json);
   }
+  log.end(summary.solve);
   return exit_code_of(summary.solve.termination);
 }
 

@@ -8,6 +8,7 @@
 #include "outputs.h"
 #include "report/photometric_pictures.h"
 #include "sheaf/solve.h"
+#include "verb.h"
 
 namespace sheaf {
 
@@ -29,7 +30,8 @@ std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments) {
                {.name = "pictures",
                 .placeholder = "FOLDER",
                 .help = "folder for PNGs: the worst and the middle patches before and after, and a "
-                        "map of residuals for each image"})},
+                        "map of residuals for each image"}),
+       F::text(&PhotometricOutputArguments::log, log_of_steps())},
       arguments);
 }
 
@@ -40,7 +42,8 @@ PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& argumen
   check_outputs({{.option = "-o", .path = arguments_.out, .folder = true},
                  {.option = "--pictures", .path = arguments_.pictures, .folder = true},
                  {"--ply", arguments_.ply},
-                 {"--json", json}},
+                 {"--json", json},
+                 {"--log", arguments_.log}},
                 inputs);
 }
 

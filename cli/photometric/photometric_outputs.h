@@ -15,7 +15,7 @@ namespace sheaf {
 
 /// What `photometric` writes beside its summary; empty: not asked for.
 struct PhotometricOutputArguments {
-  std::string out, ply, pictures;
+  std::string out, ply, pictures, log;
 };
 std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments);
 

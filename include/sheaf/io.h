@@ -59,7 +59,8 @@ std::string write_format(const Problem& problem, const std::filesystem::path& pa
 /// compresses what is one file. Every double is stated exactly (in text in the shortest form that
 /// reads back to the same bits); what was not changed since it was read is written as it stood.
 /// Errors: ErrorCode::unwritable_output; ErrorCode::usage for a problem that the format cannot
-/// hold; the target is then as it was.
+/// hold, that is not valid, or whose ids occur twice or names hold zero bytes or line ends, which
+/// `read` would refuse; the target is then as it was.
 Result<void> write(const Problem& problem, const std::filesystem::path& path,
                    const WriteOptions& options = {});
 

@@ -22,6 +22,9 @@ struct Reading {
   jpeg_decompress_struct jpeg{};
   std::jmp_buf back{};
   char message[JMSG_LENGTH_MAX] = "";
+  jpeg_progress_mgr progress{};
+  const ImageBounds* bounds = nullptr;
+  std::string refusal;
   std::vector<JSAMPLE> samples;
   ~Reading() { jpeg_destroy_decompress(&jpeg); }
 };
@@ -38,6 +41,15 @@ Reading& reading_of(j_common_ptr jpeg) { return *static_cast<Reading*>(jpeg->cli
 void take_warning(j_common_ptr jpeg, int level) {
   const int code = jpeg->err->msg_code;
   if (level < 0 && (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER)) take_error(jpeg);
+}
+
+/// Each scan of a progressive image costs a pass over all of it: those of encoders have ten or so.
+void count_scans(j_common_ptr common) {
+  constexpr int kMostScans = 100;
+  if (reinterpret_cast<j_decompress_ptr>(common)->input_scan_number <= kMostScans) return;
+  Reading& reading = reading_of(common);
+  std::snprintf(reading.message, sizeof reading.message, "more than %d scans", kMostScans);
+  std::longjmp(reading.back, 1);
 }
 
 /// A JPEG of one colour takes little more than a bit for 64 pixels: larger images are lies, not
@@ -58,6 +70,10 @@ bool read_samples(Reading& reading, const unsigned char* bytes, std::size_t size
   jpeg_mem_src(&jpeg, bytes, static_cast<unsigned long>(size));
   jpeg_read_header(&jpeg, TRUE);
   if (!can_hold(size, jpeg)) ERREXIT(&jpeg, JERR_INPUT_EOF);
+  reading.refusal = reading.bounds->refusal(jpeg.image_width, jpeg.image_height, size);
+  if (!reading.refusal.empty()) return false;
+  reading.progress.progress_monitor = count_scans;
+  jpeg.progress = &reading.progress;
   jpeg.out_color_space = jpeg.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
   jpeg_start_decompress(&jpeg);
   const std::size_t row =
@@ -73,11 +89,16 @@ bool read_samples(Reading& reading, const unsigned char* bytes, std::size_t size
 
 }  // namespace
 
-Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name) {
+Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name,
+                           const ImageBounds& bounds) {
   Reading reading;
+  reading.bounds = &bounds;
   if (!read_samples(reading, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()))
     return Error(ErrorCode::unreadable_input,
-                 name + ": not a JPEG image that can be read: " + reading.message);
+                 name + ": " +
+                     (reading.refusal.empty()
+                          ? std::string("not a JPEG image that can be read: ") + reading.message
+                          : reading.refusal));
   Raster out;
   out.width = static_cast<int>(reading.jpeg.output_width);
   out.height = static_cast<int>(reading.jpeg.output_height);
@@ -86,10 +107,11 @@ Result<Raster> decode_jpeg(std::string_view bytes, const std::string& name) {
   return out;
 }
 
-Result<Raster> decode_image(std::string_view bytes, const std::string& name) {
-  if (bytes.starts_with("\xff\xd8\xff")) return decode_jpeg(bytes, name);
-  if (bytes.starts_with(kPgmMark)) return decode_pgm(bytes, name);
-  return decode_png(bytes, name);
+Result<Raster> decode_image(std::string_view bytes, const std::string& name,
+                            const ImageBounds& bounds) {
+  if (bytes.starts_with("\xff\xd8\xff")) return decode_jpeg(bytes, name, bounds);
+  if (bytes.starts_with(kPgmMark)) return decode_pgm(bytes, name, bounds);
+  return decode_png(bytes, name, bounds);
 }
 
 }  // namespace sheaf

@@ -26,7 +26,8 @@ bool read_number(std::string_view bytes, std::size_t& at, std::uint32_t& value) 
 
 }  // namespace
 
-Result<Raster> decode_pgm(std::string_view bytes, const std::string& name) {
+Result<Raster> decode_pgm(std::string_view bytes, const std::string& name,
+                          const ImageBounds& bounds) {
   constexpr std::uint32_t kWidest = 1 << 20, kLargest = 65535;
   const auto refuse = [&](std::size_t byte, const std::string& found_and_expected) {
     return Error(ErrorCode::unreadable_input,
@@ -41,6 +42,8 @@ Result<Raster> decode_pgm(std::string_view bytes, const std::string& name) {
   const auto [width, height, largest] = header;
   if (width > kWidest || height > kWidest || largest > kLargest)
     return refuse(at, "found an absurd size or largest value, expected those of a PGM image");
+  if (const std::string wrong = bounds.refusal(width, height, bytes.size()); !wrong.empty())
+    return Error(ErrorCode::unreadable_input, name + ": " + wrong);
   ++at;  // one blank
   const std::size_t size = largest > 255 ? 2 : 1;
   const std::uint64_t needed = std::uint64_t{width} * height * size;

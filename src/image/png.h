@@ -7,6 +7,7 @@
 
 #include "image/grey.h"
 #include "image/image.h"
+#include "image/image_bounds.h"
 #include "sheaf/error.h"
 
 namespace sheaf {
@@ -19,7 +20,9 @@ Result<std::string> encode_png(const Image& image);
 Result<std::string> encode_png(const Raster& raster);
 
 /// The samples of a PNG file, grey or colour, of 8 or 16 bits; palettes become colours, fewer bits
-/// become 8, transparency is left out. Errors: ErrorCode::unreadable_input with `name` in front.
-Result<Raster> decode_png(std::string_view bytes, const std::string& name);
+/// become 8, transparency is left out. Errors: ErrorCode::unreadable_input with `name` in front,
+/// also for what is out of bounds.
+Result<Raster> decode_png(std::string_view bytes, const std::string& name,
+                          const ImageBounds& bounds = {});
 
 }  // namespace sheaf

@@ -17,6 +17,8 @@ struct Reading {
   png_infop info = nullptr;
   std::string_view rest;
   std::string message;
+  const ImageBounds* bounds = nullptr;
+  std::string refusal;
   std::vector<png_byte> bytes;
   std::vector<png_bytep> rows;
   ~Reading() { png_destroy_read_struct(&png, &info, nullptr); }
@@ -61,6 +63,10 @@ bool read_samples(Reading& reading, std::size_t file_bytes, Raster& out) {
   out.height = static_cast<int>(png_get_image_height(reading.png, reading.info));
   out.channels = png_get_channels(reading.png, reading.info);
   out.bits = png_get_bit_depth(reading.png, reading.info);
+  reading.refusal =
+      reading.bounds->refusal(png_get_image_width(reading.png, reading.info),
+                              png_get_image_height(reading.png, reading.info), file_bytes);
+  if (!reading.refusal.empty()) return false;
   const std::size_t row_bytes = png_get_rowbytes(reading.png, reading.info);
   const auto height = static_cast<std::size_t>(out.height);
   if (!can_hold(file_bytes, row_bytes, height)) png_error(reading.png, "the file is too short");
@@ -82,18 +88,23 @@ void copy_samples(const std::vector<png_byte>& bytes, Raster& out) {
 
 }  // namespace
 
-Result<Raster> decode_png(std::string_view bytes, const std::string& name) {
+Result<Raster> decode_png(std::string_view bytes, const std::string& name,
+                          const ImageBounds& bounds) {
   const auto unreadable = [&](const std::string& why) {
     return Error(ErrorCode::unreadable_input, name + ": not a PNG image that can be read: " + why);
   };
   Reading reading;
   reading.rest = bytes;
+  reading.bounds = &bounds;
   reading.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reading, take_error, ignore_warning);
   if (reading.png == nullptr) return unreadable("libpng cannot be used");
   reading.info = png_create_info_struct(reading.png);
   if (reading.info == nullptr) return unreadable("libpng has no memory");
   Raster out;
-  if (!read_samples(reading, bytes.size(), out)) return unreadable(reading.message);
+  if (!read_samples(reading, bytes.size(), out))
+    return reading.refusal.empty()
+               ? unreadable(reading.message)
+               : Error(ErrorCode::unreadable_input, name + ": " + reading.refusal);
   if (out.channels != 1 && out.channels != 3)
     return unreadable(std::to_string(out.channels) + " channels, expected 1 or 3");
   copy_samples(reading.bytes, out);

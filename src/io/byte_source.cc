@@ -42,14 +42,24 @@ Compression sniff(std::string_view bytes) {
 }  // namespace
 
 Result<RawBytes> RawBytes::open(const std::filesystem::path& path) {
+  return open_with(path, false);
+}
+
+Result<RawBytes> RawBytes::open_regular(const std::filesystem::path& path) {
+  return open_with(path, true);
+}
+
+Result<RawBytes> RawBytes::open_with(const std::filesystem::path& path, bool regular) {
   RawBytes raw;
   raw.name_ = path.string();
-  raw.fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  raw.fd_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (regular ? O_NONBLOCK : 0));
   if (raw.fd_ < 0) return unreadable(raw.name_, errno);
   struct stat status;
   if (::fstat(raw.fd_, &status) != 0) return unreadable(raw.name_, errno);
   if (S_ISDIR(status.st_mode))
     return unreadable(raw.name_ + ": found a directory, expected a file");
+  if (regular && !S_ISREG(status.st_mode))
+    return unreadable(raw.name_ + ": found a pipe or a device, expected a regular file");
   if (S_ISREG(status.st_mode)) {
     raw.size_ = static_cast<std::uint64_t>(status.st_size);
 #if defined(POSIX_FADV_SEQUENTIAL)

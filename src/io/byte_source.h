@@ -23,6 +23,9 @@ class Sha256;
 class RawBytes {
  public:
   static Result<RawBytes> open(const std::filesystem::path& path);
+  /// The same, of a file in a folder: a pipe, which would have to be waited for, or a device, which
+  /// may never end, is an error.
+  static Result<RawBytes> open_regular(const std::filesystem::path& path);
   RawBytes(std::string_view bytes, std::string name);
   RawBytes(RawBytes&& other) noexcept;
   RawBytes& operator=(RawBytes&&) = delete;
@@ -38,6 +41,7 @@ class RawBytes {
 
  private:
   RawBytes() = default;
+  static Result<RawBytes> open_with(const std::filesystem::path& path, bool regular);
 
   int fd_ = -1;
   std::string_view memory_;

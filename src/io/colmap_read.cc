@@ -12,9 +12,8 @@ namespace fs = std::filesystem;
 Error unreadable(const std::string& message) { return Error(ErrorCode::unreadable_input, message); }
 
 std::optional<Error> load(const fs::path& path, std::string& bytes, bool may_be_empty = false) {
-  Result<RawBytes> raw = RawBytes::open(path);
+  Result<RawBytes> raw = RawBytes::open_regular(path);
   if (!raw.ok()) return raw.error();
-  if (!raw.value().size()) return unreadable(path.string() + ": found no regular file");
   bytes.resize(*raw.value().size());
   const Result<std::size_t> n = raw.value().read(bytes.data(), bytes.size());
   if (!n.ok()) return n.error();

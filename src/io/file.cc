@@ -1,5 +1,6 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <chrono>
 #include <future>
 #include <new>
@@ -10,6 +11,7 @@
 #include "io/byte_source.h"
 #include "io/colmap.h"
 #include "io/format.h"
+#include "io/line_cursor.h"
 #include "io/output_file.h"
 #include "io/output_folder.h"
 #include "io/ply.h"
@@ -223,6 +225,28 @@ Result<void> write_ply_file(const Problem& problem, const fs::path& path) {
   return write_ply(problem, out.value());
 }
 
+template <class Id>
+bool occurs_twice(std::vector<Id> ids) {
+  std::sort(ids.begin(), ids.end());
+  return std::adjacent_find(ids.begin(), ids.end()) != ids.end();
+}
+
+/// What `read` would refuse: ids that occur twice, and names that end in their middle or begin a
+/// line.
+Result<void> check_names(const Problem& problem) {
+  if (problem.metadata == nullptr) return {};
+  const SceneMetadata& m = *problem.metadata;
+  const auto usage = [](const std::string& text) { return Error(ErrorCode::usage, text); };
+  if (occurs_twice(m.image_ids)) return usage("an image's id occurs twice in the metadata");
+  if (occurs_twice(m.camera_ids)) return usage("a camera's id occurs twice in the metadata");
+  if (occurs_twice(m.point_ids)) return usage("a point's id occurs twice in the metadata");
+  for (std::size_t i = 0; i < m.image_names.size(); ++i)
+    if (m.image_names[i].find_first_of(std::string_view("\0\n\r", 3)) != std::string::npos)
+      return usage("the name of image " + std::to_string(i) + ", " +
+                   sheaf::quoted(m.image_names[i]) + ", holds a zero byte or a line's end");
+  return {};
+}
+
 /// The problem with the poses that frames and sensors give: itself, or a copy in `moved`.
 const Problem& placed(const Problem& problem, Problem& moved) {
   for (std::size_t i = 0; i < problem.num_images(); ++i) {
@@ -274,6 +298,7 @@ std::string write_format(const Problem& problem, const fs::path& path) {
 
 Result<void> write(const Problem& given, const fs::path& path, const WriteOptions& options) {
   if (Result<void> valid = validate(given); !valid.ok()) return valid;
+  if (Result<void> named = check_names(given); !named.ok()) return refused(path, named.error());
   Problem moved;
   const Problem& problem = placed(given, moved);
   const std::string format = options.format.empty() ? write_format(problem, path) : options.format;
@@ -301,6 +326,8 @@ Result<void> write(const Problem& given, const fs::path& path, const WriteOption
 
 Result<void> put_model(const Problem& given, bool text, OutputFolder& out) {
   if (Result<void> valid = validate(given); !valid.ok()) return valid;
+  if (Result<void> named = check_names(given); !named.ok())
+    return refused(out.shown(), named.error());
   Problem moved;
   const Result<ColmapFiles> files = format_colmap(placed(given, moved), text);
   if (!files.ok()) return refused(out.shown(), files.error());

@@ -10,7 +10,7 @@ namespace sheaf {
 namespace fs = std::filesystem;
 
 Result<std::string> bytes_of(const fs::path& path) {
-  Result<RawBytes> raw = RawBytes::open(path);
+  Result<RawBytes> raw = RawBytes::open_regular(path);
   if (!raw.ok()) return raw.error();
   std::string out;
   constexpr std::size_t kBlock = 1 << 18;
@@ -33,14 +33,16 @@ FolderFiles files_in(const fs::path& folder) {
           [folder](const std::string& name) { return bytes_of(folder / name); }};
 }
 
-Result<Raster> raster_in(const FolderFiles& files, const std::string& name) {
+Result<Raster> raster_in(const FolderFiles& files, const std::string& name,
+                         const ImageBounds& bounds) {
   const Result<std::string> bytes = files.bytes(name);
   if (!bytes.ok()) return bytes.error();
-  return decode_image(bytes.value(), files.name(name));
+  return decode_image(bytes.value(), files.name(name), bounds);
 }
 
-Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name) {
-  const Result<Raster> raster = raster_in(files, name);
+Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name,
+                          const ImageBounds& bounds) {
+  const Result<Raster> raster = raster_in(files, name, bounds);
   if (!raster.ok()) return raster.error();
   return GreyImage{raster.value().width, raster.value().height, grey_of(raster.value())};
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "image/grey.h"
+#include "image/image_bounds.h"
 #include "io/output_folder.h"
 #include "io/text_buffer.h"
 #include "sheaf/error.h"
@@ -14,7 +15,7 @@
 
 namespace sheaf {
 
-/// A file's bytes, whatever its size turns out to be.
+/// The bytes of a regular file, whatever its size turns out to be.
 Result<std::string> bytes_of(const std::filesystem::path& path);
 
 /// The files of a folder: on a disk, or in memory where a test or a fuzzer makes them up.
@@ -28,9 +29,11 @@ struct FolderFiles {
 FolderFiles files_in(const std::filesystem::path& folder);
 
 /// A decoded image of the folder. Errors: unreadable_input.
-Result<Raster> raster_in(const FolderFiles& files, const std::string& name);
+Result<Raster> raster_in(const FolderFiles& files, const std::string& name,
+                         const ImageBounds& bounds = {});
 /// As grey levels.
-Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name);
+Result<GreyImage> grey_in(const FolderFiles& files, const std::string& name,
+                          const ImageBounds& bounds = {});
 
 /// Errors of writing: unwritable_output. Folders are made where they are not there.
 Result<void> make_folder(const std::filesystem::path& folder);

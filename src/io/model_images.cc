@@ -56,16 +56,9 @@ Result<void> read_pixels(const FolderFiles& files, PhotometricFolder& folder) {
   const Problem& model = folder.model;
   for (std::size_t i = 0; i < model.num_images(); ++i) {
     const std::string name = image_name(model, i);
-    Result<GreyImage> image = grey_in(files, name);
-    if (!image.ok()) return image.error();
     const Camera& lens = model.cameras[model.image_camera[i]];
-    const auto width = static_cast<std::uint64_t>(image.value().width);
-    const auto height = static_cast<std::uint64_t>(image.value().height);
-    if (width != lens.width_px || height != lens.height_px)
-      return Error(ErrorCode::unreadable_input,
-                   files.name(name) + ": found " + std::to_string(width) + " x " +
-                       std::to_string(height) + " pixels, expected its camera's " +
-                       std::to_string(lens.width_px) + " x " + std::to_string(lens.height_px));
+    Result<GreyImage> image = grey_in(files, name, {lens.width_px, lens.height_px, "its camera's"});
+    if (!image.ok()) return image.error();
     folder.files.push_back(files.folder / name);
     folder.problem.images.push_back(std::move(image).value());
   }

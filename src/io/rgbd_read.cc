@@ -98,8 +98,9 @@ Result<std::vector<Frame>> frames_by_number(const FolderFiles& files, int every)
   return out;
 }
 
-Result<DepthMap> depth_in_folder(const FolderFiles& files, const std::string& name, double scale) {
-  const Result<Raster> raster = raster_in(files, name);
+Result<DepthMap> depth_in_folder(const FolderFiles& files, const std::string& name,
+                                 const ImageBounds& bounds, double scale) {
+  const Result<Raster> raster = raster_in(files, name, bounds);
   if (!raster.ok()) return raster.error();
   const Raster& from = raster.value();
   if (from.channels != 1 || from.bits != 16)
@@ -120,14 +121,11 @@ Result<std::vector<DepthMap>> read_images(const FolderFiles& files,
   for (const Frame& frame : frames) {
     Result<GreyImage> image = grey_in(files, frame.image);
     if (!image.ok()) return image.error();
-    Result<DepthMap> map = depth_in_folder(files, frame.depth, depth_scale);
+    const ImageBounds same{static_cast<std::uint64_t>(image.value().width),
+                           static_cast<std::uint64_t>(image.value().height),
+                           "those of " + frame.image + ","};
+    Result<DepthMap> map = depth_in_folder(files, frame.depth, same, depth_scale);
     if (!map.ok()) return map.error();
-    const auto size = [](const auto& of) {
-      return std::to_string(of.width) + " x " + std::to_string(of.height);
-    };
-    if (map.value().width != image.value().width || map.value().height != image.value().height)
-      return unreadable(files.name(frame.depth) + ": found " + size(map.value()) +
-                        " pixels, expected those of " + frame.image + ", " + size(image.value()));
     folder.problem.images.push_back(std::move(image).value());
     maps.push_back(std::move(map).value());
     folder.problem.poses.push_back(frame.pose);

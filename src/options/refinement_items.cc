@@ -7,9 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <map>
+#include <iterator>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "options/words.h"
 #include "platform/unicode.h"
@@ -20,19 +21,22 @@ namespace {
 
 using Part = RefinementItem::Part;
 
-const std::map<std::string, Part, std::less<>> kParts = {{"points", Part::points},
-                                                         {"poses", Part::poses},
-                                                         {"pose", Part::poses},
-                                                         {"image", Part::image},
-                                                         {"intrinsics", Part::lens},
-                                                         {"camera", Part::lens},
-                                                         {"f", Part::focal},
-                                                         {"focal", Part::focal},
-                                                         {"k", Part::distortion},
-                                                         {"distortion", Part::distortion},
-                                                         {"pp", Part::principal_point},
-                                                         {"principal-point", Part::principal_point},
-                                                         {"sensor_from_rig", Part::sensor}};
+// A plain array, so that nothing is allocated before main.
+constexpr std::pair<std::string_view, Part> kParts[] = {
+    {"points", Part::points},
+    {"poses", Part::poses},
+    {"pose", Part::poses},
+    {"image", Part::image},
+    {"intrinsics", Part::lens},
+    {"camera", Part::lens},
+    {"f", Part::focal},
+    {"focal", Part::focal},
+    {"k", Part::distortion},
+    {"distortion", Part::distortion},
+    {"pp", Part::principal_point},
+    {"principal-point", Part::principal_point},
+    {"sensor_from_rig", Part::sensor},
+};
 
 const char kExpected[] =
     "points, poses, intrinsics, f (or focal), k (or distortion), pp (or principal-point), a "
@@ -61,7 +65,9 @@ std::optional<RefinementItem> read_item(const std::string& text) {
   const bool named = equals != std::string::npos;
   if (named) item.who = text.substr(equals + 1);
   if (wrong_reach(name, named) || (named && item.who.empty())) return {};
-  if (const auto part = kParts.find(name); part != kParts.end()) {
+  const auto part = std::find_if(std::begin(kParts), std::end(kParts),
+                                 [&](const auto& known) { return known.first == name; });
+  if (part != std::end(kParts)) {
     item.part = part->second;
   } else {
     if (!is_parameter(name)) return {};

@@ -70,6 +70,22 @@ Result<void> validate_sizes(const Problem& p) {
   return {};
 }
 
+/// Memory that is not there is read by nobody, whatever else is wrong.
+Result<void> check_places(const Problem& p) {
+  if (Result<void> sizes = validate_sizes(p); !sizes.ok()) return sizes;
+  for (std::size_t i = 0; i < p.num_images(); ++i)
+    if (p.image_camera[i] >= p.cameras.size())
+      return invalid(numbered("image", i) + " names camera " + std::to_string(p.image_camera[i]) +
+                     " of " + std::to_string(p.cameras.size()));
+  for (std::size_t i = 0; i < p.num_observations(); ++i)
+    if (p.observation_image[i] >= p.num_images() || p.observation_point[i] >= p.num_points())
+      return invalid(
+          numbered("observation", i) + " names image " + std::to_string(p.observation_image[i]) +
+          " of " + std::to_string(p.num_images()) + " and point " +
+          std::to_string(p.observation_point[i]) + " of " + std::to_string(p.num_points()));
+  return {};
+}
+
 Result<void> validate_images(const Problem& p) {
   for (std::size_t i = 0; i < p.num_images(); ++i) {
     if (p.image_camera[i] >= p.cameras.size())
@@ -165,6 +181,7 @@ Result<void> validate(const Problem& problem) {
 }
 
 Evaluation evaluate(const Problem& problem) {
+  check_places(problem).value();
   std::vector<Matrix3<double>> rotations;
   rotations.reserve(problem.num_images());
   std::vector<Pose> poses;

@@ -236,7 +236,9 @@ class Attempts {
       const Hooks hooks{[&] { return find_better(build, *home); },
                         [&](double iterations) { return change_solver(build, *home, iterations); },
                         &progress_, [&] { write_down(*home); }};
-      restarts = minimize_in_rounds(*home, options_, clock_, summary_, &history_, &hooks);
+      restarts = minimize(*home, hooks);
+      const std::function<bool()> never = [] { return false; };
+      const CancelScope to_the_end(never);  // what is reached is stored, whoever asks to stop
       if (!restarts) build.store(*home, problem_);
       behind_after = !restarts && home->count_behind() > 0;
     }
@@ -248,6 +250,20 @@ class Attempts {
     summary_.solve_s = clock_.seconds() - summary_.setup_s;
     if (behind_after) summary_.behind_camera_after = behind_camera(problem_, threads_);
     return {};
+  }
+
+  /// Steps in rounds. Between two of them a pass may be given up, too: the home's state is then the
+  /// best one, with what the last step left of it.
+  bool minimize(Home& home, const Hooks& hooks) {
+    try {
+      return minimize_in_rounds(home, options_, clock_, summary_, &history_, &hooks);
+    } catch (const Cancelled&) {
+      if (!history_) throw;  // no step has been made of this attempt
+      if (summary_.rounds.size() > 1 && summary_.rounds.back().steps == 0)
+        summary_.rounds.pop_back();
+      tell_cut_short();
+      return false;
+    }
   }
 
   /// Of the problem's state, or of a checkpoint's, which was reached from it.

@@ -58,7 +58,7 @@ class Segments {
 };
 
 ExifGps gps_of(const fs::path& image) {
-  Result<RawBytes> bytes = RawBytes::open(image);
+  Result<RawBytes> bytes = RawBytes::open_regular(image);
   if (!bytes.ok()) return {{}, bytes.error().what()};
   const std::string block = Segments(std::move(bytes).value()).exif();
   if (block.empty()) return {{}, "it has no EXIF"};

@@ -52,6 +52,7 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--ply",
                     "--solver",
                     "--pictures",
+                    "--log",
                     "--memory-limit",
                     "--intrinsics",
                     "--interpolation",
@@ -99,7 +100,7 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--projection", "--projection-figure", "--distance", "--grid"});
   if (verb == "calibrate")
     options.insert({"--board", "--spacing", "--size", "--camera", "--focal", "--loss", "--output"});
-  if (verb == "solve") options.insert("--sigmas");
+  if (verb == "solve") options.insert({"--sigmas", "--log"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",

@@ -280,7 +280,10 @@ TEST_F(JsonTest, SolveTellsWhatHappened) {
                                 {"initial_damping", 0.01},
                                 {"inner_iterations", 3},
                                 {"recoveries", 3},
-                                {"simd", "best"}}));
+                                {"simd", "best"},
+                                {"checkpoint", ""},
+                                {"checkpoint_every_s", 60.0},
+                                {"resume", ""}}));
   EXPECT_EQ(s["input"]["path"], "in.txt");
   EXPECT_EQ(s["input"]["cameras"], 16);
   EXPECT_EQ(s["input"]["poses"], 16);

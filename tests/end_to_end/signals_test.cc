@@ -120,6 +120,33 @@ TEST_F(Signals, AFileThatMayNotGrowIsSix) {
   EXPECT_EQ(folder_.names(), (Words{"in.txt", "o.txt"}));
 }
 
+// A log is there as far as the run has come; it is whole lines, and the end is one of them.
+TEST_F(Signals, LogsAreWrittenStepByStep) {
+  for (const Words& verb : {Words{"solve", "in.txt"}, Words{"photometric", "images"}}) {
+    if (verb[1] == "images")
+      run_command({"generate", "images", "--photometric", "--points", "50"}, folder_.path());
+    const Outcome outcome =
+        run_command({verb[0], verb[1], "--quiet", "--log", "log", "--json", "o"}, folder_.path());
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    std::ifstream file(folder_ / "log");
+    std::vector<nlohmann::json> lines;
+    for (std::string line; std::getline(file, line);) lines.push_back(nlohmann::json::parse(line));
+    const auto document = json_of(folder_ / "o");
+    ASSERT_EQ(lines.size(), document["iterations"].size() + 1);
+    for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+      EXPECT_EQ(lines[i]["event"], "step");
+      EXPECT_EQ(lines[i]["cost"], document["iterations"][i]["cost"]);
+    }
+    EXPECT_EQ(lines.back()["event"], "end");
+    EXPECT_EQ(lines.back()["termination"], document["termination"]);
+    EXPECT_EQ(lines.back()["final_cost"], document["final_cost"]);
+  }
+  const Outcome full = shell("SHEAF solve in.txt -o o.txt --log /dev/full --json o.json");
+  EXPECT_EQ(full.exit_code, 6) << full.err;
+  EXPECT_NE(full.err.find("/dev/full: cannot be written"), std::string::npos) << full.err;
+  EXPECT_TRUE(fs::exists(folder_ / "o.txt") && fs::exists(folder_ / "o.json"));
+}
+
 // A run that was killed leaves its partial file; one with the same process number goes on.
 TEST_F(Signals, WhatAKilledRunLeftIsCleanedByTheNext) {
   RunningCommand command({"generate", "big.txt", "--like", "ladybug-1723"}, folder_.path());

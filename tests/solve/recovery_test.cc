@@ -155,5 +155,27 @@ TEST(Recovery, StopsWhenAsked) {
   EXPECT_EQ(s.termination, Termination::time_limit);
 }
 
+// Set-up takes seconds on large scenes: it is given up too, whatever is being built.
+TEST(Recovery, StopsWithinSetUp) {
+  for (const CameraSolverKind solver :
+       {CameraSolverKind::dense, CameraSolverKind::sparse, CameraSolverKind::iterative_implicit}) {
+    Problem problem = turned_scene();
+    const Problem before = problem;
+    StopSource source;
+    source.request_stop();
+    SolveOptions options;
+    options.solver = solver;
+    options.threads = 2;
+    options.stop = source.get_token();
+    const Summary s = solve(problem, options);
+    EXPECT_EQ(s.termination, Termination::stopped);
+    EXPECT_NE(s.words.find("before the first step"), std::string::npos) << s.words;
+    EXPECT_EQ(s.final_cost, evaluate(before).cost);
+    EXPECT_EQ(problem.points, before.points);
+    EXPECT_EQ(problem.observation_xy, before.observation_xy);
+    EXPECT_EQ(s.iterations.size(), 1u);
+  }
+}
+
 }  // namespace
 }  // namespace sheaf
