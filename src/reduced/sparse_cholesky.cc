@@ -169,6 +169,7 @@ bool SparseCholesky::factor_supernode(std::size_t supernode, Job& job, bool shar
     const std::size_t step = shared ? kRowsShared : kRowsAlone,
                       tasks = (to - from + step - 1) / step;
     const auto run = [&](std::size_t t) {
+      if (job.stops()) return;
       const std::size_t first = from + t * step, end = std::min(to, first + step);
       apply_updates(supernode, first, end, scratch_[job.threads.worker()].data());
       task(first, end);
@@ -180,6 +181,7 @@ bool SparseCholesky::factor_supernode(std::size_t supernode, Job& job, bool shar
   job.fill(supernode);
   in_rows(0, s.top, [](std::size_t, std::size_t) {});
   for (std::size_t k = 0; k < width; k += kPanel) {
+    if (job.stops()) return false;
     const std::size_t w = std::min(kPanel, width - k), below = k + w;
     if (!kernels_.factor_block(A, s.lda, k, w, inverse)) return false;
     if (below == width) break;
