@@ -47,6 +47,8 @@ Statistics CountingSink::statistics() const {
                length_at(points_ - 1)};
   out.mean_track = static_cast<double>(observations_) / static_cast<double>(points_);
   out.observations_per_image = range_of(per_image_);
+  out.mean_observations_per_image =
+      static_cast<double>(observations_) / static_cast<double>(images_);
   out.focal_px = range_of(focal_px_);
   return out;
 }

@@ -156,12 +156,6 @@ Json norms_json(const Problem& problem) {
   return {{"count", count}, {"first", off.images}, {"largest", number(off.largest)}};
 }
 
-double mean_observations(const Problem& problem) {
-  if (problem.num_images() == 0) return 0;
-  return static_cast<double>(problem.num_observations()) /
-         static_cast<double>(problem.num_images());
-}
-
 std::uint32_t camera_id(const Problem& problem, std::size_t c) {
   const bool known = problem.metadata && !problem.metadata->camera_ids.empty();
   return known ? problem.metadata->camera_ids[c] : static_cast<std::uint32_t>(c);
@@ -217,8 +211,8 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
             input.read_s);
   for (const std::string& note : input.notes) print_out("note        {}\n", note);
   print_out("registered  {} images, mean {:.6g} observations ({:.0f} to {:.0f}, median {:.6g})\n",
-            input.problem.num_images(), mean_observations(input.problem), images.min, images.max,
-            images.median);
+            input.problem.num_images(), statistics.mean_observations_per_image, images.min,
+            images.max, images.median);
   print_out("points      {}, mean track length {:.3f} ({:.0f} to {:.0f} observations)\n",
             input.problem.num_points(), statistics.mean_track, statistics.track.min,
             statistics.track.max);
@@ -255,7 +249,6 @@ int run(const Arguments& arguments) {
   if (json.empty()) return 0;
   Json document = {{"version", SHEAF_VERSION}, {"input", read}};
   document.update(statistics_json(statistics));
-  document["observations_per_image"]["mean"] = number(mean_observations(input.problem));
   document["cameras"] = cameras_json(input.problem, camera_statistics(input.problem));
   document["lenses"] = Json::array();
   for (const auto& [model, count] : lenses_of(input.problem))

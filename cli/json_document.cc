@@ -133,8 +133,10 @@ Json statistics_json(const Statistics& statistics) {
   Json track = range_json(statistics.track);
   track["mean"] = number(statistics.mean_track);
   track["histogram"] = histogram;
+  Json images = range_json(statistics.observations_per_image);
+  images["mean"] = number(statistics.mean_observations_per_image);
   return {{"track", track},
-          {"observations_per_image", range_json(statistics.observations_per_image)},
+          {"observations_per_image", images},
           {"focal_px", range_json(statistics.focal_px)}};
 }
 

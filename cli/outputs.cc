@@ -97,6 +97,28 @@ void check_holds(const Problem& problem, const std::string& path) {
   if (format.starts_with("colmap")) check_model_folder(problem, format, path);
 }
 
+void check_holds_refined(const Problem& problem, const Fixed& fixed, const std::string& path) {
+  if (path.empty()) return;
+  Problem refined;
+  refined.poses = problem.poses;
+  refined.image_camera = problem.image_camera;
+  refined.cameras = problem.cameras;
+  refined.metadata = problem.metadata;
+  std::vector<bool> seen(problem.cameras.size(), false);
+  for (const std::uint32_t image : problem.observation_image)
+    seen[problem.image_camera[image]] = true;
+  const std::vector<ParameterSet> held = held_parameters(problem, fixed);
+  // Any numbers that are not equal by chance.
+  for (std::size_t c = 0; c < seen.size(); ++c)
+    for (std::size_t k = 0; seen[c] && k < parameter_count(problem.cameras[c].model); ++k)
+      if (((held[c] >> k) & 1u) == 0)
+        refined.cameras[c].parameters[k] += 1e-3 * static_cast<double>(k + 1);
+  const Result<void> held_by = can_hold(write_format(refined, path), refined);
+  if (!held_by.ok())
+    throw Error(held_by.error().code(),
+                fmt::format("once its lenses are refined, {}", held_by.error().what()));
+}
+
 std::uint64_t bytes_at(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;

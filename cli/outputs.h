@@ -29,6 +29,9 @@ void check_outputs(const std::vector<NamedOutput>& outputs,
 /// the folder of a model. Nothing without a name.
 void check_holds(const Problem& problem, const std::string& path);
 
+/// The same of what a solve leaves of the problem, whose lenses are all that `fixed` does not hold.
+void check_holds_refined(const Problem& problem, const Fixed& fixed, const std::string& path);
+
 /// Of a file, or of the files of a folder.
 std::uint64_t bytes_at(const std::string& path);
 

@@ -216,6 +216,7 @@ int run(Arguments& arguments) {
   StepLog log(arguments.log);
   SolveOptions options = options_for(arguments, interrupt, progress, log);
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
+  if (options.max_iterations > 0) check_holds_refined(problem, options.fixed, arguments.out);
   SurveyWork work{place_survey(arguments.constraints, problem, options.fixed)};
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
   interrupt.begin_solve();

@@ -4,7 +4,9 @@
 // Bundler, NVM, libmv, g2o, OpenSfM, OpenMVG and AliceVision, told by their content: any bytes are
 // refused with a message, or are a valid problem; what Sheaf writes of it reads back, of the first
 // three to the same. Behind a zero byte stands the file that lies beside a JSON one (tracks.csv).
+// Other texts with a zero byte are SBA's cameras, points and, behind another one, calibration.
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -17,6 +19,7 @@
 #include "io/json_lines.h"
 #include "io/libmv.h"
 #include "io/nvm.h"
+#include "io/sba.h"
 
 namespace {
 
@@ -86,6 +89,24 @@ void check_json(const std::string& text, const std::string& beside) {
   }
 }
 
+/// What stands before the next zero byte, which is taken off with it.
+std::string take_part(std::string_view& bytes) {
+  const std::string part(bytes.substr(0, bytes.find('\0')));
+  bytes.remove_prefix(std::min(bytes.size(), part.size() + 1));
+  return part;
+}
+
+void check_sba(std::string_view bytes) {
+  sheaf::SbaFiles files;
+  files.cameras = {"input/cams.txt", take_part(bytes)};
+  files.points = {"input/pts.txt", take_part(bytes)};
+  files.calib = {"input/calib.txt", take_part(bytes)};
+  std::vector<std::string> notes;
+  const Parsed problem = sheaf::parse_sba(files, notes);
+  if (!problem.ok()) return require_refusal(problem.error(), "input");
+  require(sheaf::validate(problem.value()).ok(), "what was read is valid");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -97,9 +118,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check(sheaf::parse_nvm, sheaf::format_nvm, bytes, !bytes.starts_with("NVM_V3_R9T"));
   if (sheaf::is_g2o(bytes)) check(sheaf::parse_g2o, nullptr, bytes, true);
   if (bytes.starts_with('{') || bytes.starts_with('[')) {
-    const std::size_t end = bytes.find('\0');
-    check_json(std::string(bytes.substr(0, end)),
-               end == bytes.npos ? "" : std::string(bytes.substr(end + 1)));
+    std::string_view rest = bytes;
+    const std::string text = take_part(rest);
+    check_json(text, std::string(rest));
+  } else if (bytes.find('\0') != bytes.npos) {
+    check_sba(bytes);
   }
   if (sheaf::is_libmv(bytes)) check(sheaf::parse_libmv, nullptr, bytes, true);
   return 0;

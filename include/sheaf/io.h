@@ -99,7 +99,7 @@ struct PhotometricReadOptions {
   std::optional<Pinhole> camera{};  ///< of all images, instead of what the folder says
   PoseNoise noise{};                ///< disturbs the poses, before it is decided what they see
   int every = 1;                    ///< RGB-D: takes the first image and every so many after it
-  /// RGB-D: what a depth image has for one scene unit; 0 in it is no depth.
+  /// RGB-D: what a depth image has for one scene unit; 0 and 65535 are no depth.
   double depth_scale = 5000;
   int cell_px = 16;                  ///< RGB-D: at most one point in each square of this size
   double least_slope = 2;            ///< RGB-D: grey levels per pixel that a point needs

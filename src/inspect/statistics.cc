@@ -44,6 +44,9 @@ Statistics statistics_of(const Problem& problem) {
         static_cast<double>(problem.num_observations()) / static_cast<double>(problem.num_points());
   out.observations_per_image =
       range_of(occurrences(problem.observation_image, problem.num_images()));
+  if (problem.num_images() > 0)
+    out.mean_observations_per_image =
+        static_cast<double>(problem.num_observations()) / static_cast<double>(problem.num_images());
   std::vector<double> focal;
   for (const Camera& camera : problem.cameras) focal.push_back(camera.parameters[0]);
   out.focal_px = range_of(std::move(focal));

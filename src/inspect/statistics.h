@@ -23,6 +23,7 @@ struct Statistics {
   Range track;
   double mean_track = 0;
   Range observations_per_image;
+  double mean_observations_per_image = 0;
   Range focal_px;
   double mean_error_px = 0;  ///< mean of the points' mean |r|, as COLMAP states it for a model
 };

@@ -36,19 +36,19 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
     return Error(ErrorCode::usage,
                  "camera " + std::to_string(c) + ": OpenMVG cannot state it: " + why);
   };
-  const auto two_focals = [&](double fx, double fy) {
+  const auto two_focals = [&] {
     return refuse("it has one focal length, and the " + std::string(to_string(camera.model)) +
-                  " lens has fx = " + std::to_string(fx) + " and fy = " + std::to_string(fy));
+                  " lens two, fx and fy (--fix f keeps equal ones equal)");
   };
   const auto& k = camera.parameters;
   if (camera.model == CameraModel::opencv_fisheye) {
-    if (k[0] != k[1]) return two_focals(k[0], k[1]);
+    if (k[0] != k[1]) return two_focals();
     return Intrinsics{"fisheye", "fisheye", k[0], k[2], k[3], {k.begin() + 4, k.begin() + 8}};
   }
   const Result<BrownLens> found = brown_lens(camera);
   if (!found.ok()) return refuse(found.error().what());
   const BrownLens& lens = found.value();
-  if (lens.fx != lens.fy) return two_focals(lens.fx, lens.fy);
+  if (lens.fx != lens.fy) return two_focals();
   Intrinsics out{"pinhole", nullptr, lens.fx, lens.cx, lens.cy, {}};
   if (lens.tangential()) {
     out.type = "pinhole_brown_t2", out.coefficients = "disto_t2";

@@ -69,6 +69,25 @@ TEST_F(FormatsCommand, InfoBeginsWithWhatOneLooksFor) {
   EXPECT_NE(solved.out.find("8 images, 1 blocks of lenses, "), std::string::npos) << solved.out;
 }
 
+/// OpenMVG has one focal length; a FULL_OPENCV lens, which its third coefficient takes, has two.
+TEST_F(FormatsCommand, WhatTheResultCannotBeWrittenAsIsSaidBeforeASolve) {
+  Problem problem = read(folder_ / "model").value();
+  for (Camera& camera : problem.cameras) {
+    const double f = camera.parameters[0];
+    camera = {CameraModel::full_opencv, {f, f, 900, 600, 0.01, 0, 0, 0, 0.001}, 1800, 1200};
+  }
+  write(problem, folder_ / "sfm_data.json").value();
+  std::filesystem::create_directory(folder_ / "r");
+  const Outcome refused = run({"solve", "sfm_data.json", "-o", "r/sfm_data.json"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("once its lenses are refined, openmvg cannot hold this problem"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_NE(refused.err.find("--fix f"), std::string::npos) << refused.err;
+  EXPECT_EQ(refused.err.find("iteration"), std::string::npos) << refused.err;
+  EXPECT_EQ(run({"solve", "sfm_data.json", "-o", "r/sfm_data.json", "--fix", "f"}).exit_code, 0);
+}
+
 TEST_F(FormatsCommand, SaysWhatAConversionDrops) {
   const Outcome kept = run({"convert", "model", "copy", "--json", "o.json"});
   EXPECT_EQ(kept.exit_code, 0);

@@ -413,7 +413,7 @@ TEST(OpenMvg, TypesAndPointersAreNamedWhereTheyOccurFirst) {
   Problem two = p;
   two.cameras[0].model = CameraModel::pinhole;
   two.cameras[0].parameters = {500, 501, 330, 220};
-  EXPECT_NE(std::string(format_openmvg(two).error().what()).find("fy = 501"), std::string::npos);
+  EXPECT_NE(std::string(format_openmvg(two).error().what()).find("fx and fy"), std::string::npos);
 }
 
 }  // namespace
