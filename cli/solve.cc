@@ -189,18 +189,18 @@ std::vector<std::string> inputs_of(const Arguments& arguments) {
   return with_survey(std::move(own), arguments.constraints);
 }
 
+std::vector<NamedOutput> outputs_of(const Arguments& arguments) {
+  return {{"-o", arguments.out, true},    {"--json", arguments.common.json},
+          {"--ply", arguments.ply},       {"--residuals", arguments.constraints.residuals},
+          {"--sigmas", arguments.sigmas}, {"--checkpoint", arguments.solve.options.checkpoint},
+          {"--log", arguments.log}};
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   const bool wants_json = !arguments.common.json.empty();
-  check_outputs({{"-o", arguments.out, true},
-                 {"--json", arguments.common.json},
-                 {"--ply", arguments.ply},
-                 {"--residuals", arguments.constraints.residuals},
-                 {"--sigmas", arguments.sigmas},
-                 {"--checkpoint", arguments.solve.options.checkpoint},
-                 {"--log", arguments.log}},
-                inputs_of(arguments));
+  check_outputs(outputs_of(arguments), inputs_of(arguments));
   InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
   Problem& problem = input.problem;
   check_holds(problem, arguments.out);

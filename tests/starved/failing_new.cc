@@ -1,20 +1,20 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Linked with the command in place of the library's own: the n-th allocation of the run fails, for
-// the n of the variable SHEAF_FAILING_ALLOCATION, and only that one.
+// The command, with these in place of the library's own: the n-th allocation that main makes fails,
+// for the n of the variable SHEAF_FAILING_ALLOCATION, and only that one.
 
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
+#include "command_line.h"
+#include "verb.h"
+
 namespace {
 
-std::atomic<long> left = [] {
-  const char* text = std::getenv("SHEAF_FAILING_ALLOCATION");
-  return text != nullptr ? std::atol(text) : 0L;
-}();
+std::atomic<long> left{0};
 
 void* allocated(std::size_t size, std::size_t alignment) {
   if (left > 0 && --left == 0) {
@@ -49,3 +49,9 @@ void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory
 void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+int main(int argc, char** argv) {
+  const char* text = std::getenv("SHEAF_FAILING_ALLOCATION");
+  left = text != nullptr ? std::atol(text) : 0;
+  return sheaf::run_command_line(argc, argv, sheaf::all_verbs);
+}
