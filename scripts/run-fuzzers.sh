@@ -3,13 +3,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # Runs each fuzz target for a while; builds them with clang's libFuzzer where
-# scripts/run-sanitizers.sh asan has not.
+# build/asan has none.
 #   scripts/run-fuzzers.sh [SECONDS_EACH]    default 60
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 seconds=${1:-60}
 
-# The address sanitizer's build has them where it was made with such a clang.
+# The address sanitizer's build has them where it was made by such a clang with SHEAF_BUILD_FUZZ.
 place=build/asan
 if ! compgen -G 'build/asan/fuzz/*_fuzz' >/dev/null; then
   place=build/fuzz
