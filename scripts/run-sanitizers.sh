@@ -30,9 +30,11 @@ case $kind in
       echo "tsan: this kernel does not let the thread sanitizer run: NOT CHECKED"
       exit 0
     fi
+    # Signals are left out: this sanitizer keeps them back while a call waits that is begun again,
+    # and their handler, which no other thread reads, has nothing for it to find.
     "${run[@]}" scripts/build.sh tsan
     "${run[@]}" ctest --test-dir build/tsan -j "$(nproc)" --output-on-failure \
-      -R 'Thread|Parallel|SameBitsFor|Hash|CtrlCWhile|Examples.Arrays' --no-tests=error
+      -R 'Thread|Parallel|SameBitsFor|Hash|Examples.Arrays' --no-tests=error
     ;;
   *)
     echo "usage: scripts/run-sanitizers.sh asan|tsan" >&2
