@@ -41,7 +41,7 @@ TEST_F(Signals, AreAlikeWhileReading) {
   ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     RunningCommand command({"solve", "pipe", "-o", "o.txt"}, folder_.path());
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    std::this_thread::sleep_for(std::chrono::milliseconds(800));
     command.send(signal);
     EXPECT_EQ(command.wait().exit_code, 130) << signal;
   }
