@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,15 +32,8 @@ struct Arguments {
   double spacing = 0, focal = 0;
 };
 
-/// AxB of two whole numbers.
-std::array<std::uint32_t, 2> two_of(const char* option, const std::string& text) {
-  std::array<std::uint32_t, 2> out{};
-  const char* end = text.data() + text.size();
-  const auto [cross, wrong] = std::from_chars(text.data(), end, out[0]);
-  if (wrong == std::errc() && cross != end && *cross == 'x') {
-    const auto [last, bad] = std::from_chars(cross + 1, end, out[1]);
-    if (bad == std::errc() && last == end) return out;
-  }
+std::pair<std::uint32_t, std::uint32_t> two_of(const char* option, const std::string& text) {
+  if (const auto sides = sides_of(text)) return *sides;
   throw Error(ErrorCode::usage, fmt::format("{}: found '{}', expected two whole numbers such as "
                                             "14x9",
                                             option, text));
@@ -153,7 +145,7 @@ int run(const Arguments& arguments) {
   print_text(summary_text(found.summary, 0));
   print_text(covariance_text(problem, options, found.covariance));
   print_text(projection_text(found.projected));
-  if (!arguments.out.empty()) {
+  if (!arguments.out.empty() && found.summary.usable()) {
     write(problem, arguments.out).value();
     print_out("wrote       {}\n", arguments.out);
   }

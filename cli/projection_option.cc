@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <tuple>
 
 #include "outputs.h"
 #include "report/projection_figure.h"
@@ -16,16 +17,13 @@ namespace sheaf {
 namespace {
 
 ProjectionGrid grid_of(const std::string& text) {
+  constexpr std::uint32_t kMost = 2000;
   ProjectionGrid out;
-  const char* end = text.data() + text.size();
-  const auto [cross, wrong] = std::from_chars(text.data(), end, out.columns);
-  if (wrong == std::errc() && cross != end && *cross == 'x') {
-    const auto [last, bad] = std::from_chars(cross + 1, end, out.rows);
-    constexpr std::uint32_t kMost = 2000;
-    if (bad == std::errc() && last == end && out.columns >= 2 && out.rows >= 2 &&
-        out.columns <= kMost && out.rows <= kMost)
-      return out;
-  }
+  if (const auto sides = sides_of(text))
+    std::tie(out.columns, out.rows) = *sides;
+  else
+    out.columns = 0;
+  if (out.columns >= 2 && out.rows >= 2 && out.columns <= kMost && out.rows <= kMost) return out;
   throw Error(ErrorCode::usage,
               "--grid: found '" + text + "', expected COLUMNSxROWS, 2 to 2000 each, such as 60x40");
 }
@@ -58,6 +56,16 @@ std::string numbered(const std::string& path, const LensProjection& of, bool sev
 }
 
 }  // namespace
+
+std::optional<std::pair<std::uint32_t, std::uint32_t>> sides_of(const std::string& text) {
+  std::pair<std::uint32_t, std::uint32_t> out;
+  const char* end = text.data() + text.size();
+  const auto [cross, wrong] = std::from_chars(text.data(), end, out.first);
+  if (wrong != std::errc() || cross == end || *cross != 'x') return std::nullopt;
+  const auto [last, bad] = std::from_chars(cross + 1, end, out.second);
+  if (bad != std::errc() || last != end) return std::nullopt;
+  return out;
+}
 
 std::vector<BoundOption> options_of(ProjectionArguments& a) {
   using F = FieldsOf<ProjectionArguments>;

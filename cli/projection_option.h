@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "json_document.h"
@@ -10,6 +13,9 @@
 #include "sheaf/covariance.h"
 
 namespace sheaf {
+
+/// AxB of two whole numbers, as 60x40; nothing where it is something else.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> sides_of(const std::string& text);
 
 /// The options of `covariance` about how well pixels of resting places are known.
 struct ProjectionArguments {

@@ -2,26 +2,29 @@
 # Copyright (c) 2026, the Sheaf authors.
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Runs each fuzz target for a while; builds them with clang's libFuzzer where
-# build/asan has none.
+# Builds the fuzz targets with clang's libFuzzer and runs each for a while.
 #   scripts/run-fuzzers.sh [SECONDS_EACH]    default 60
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 seconds=${1:-60}
 
-# The address sanitizer's build has them where it was made by such a clang with SHEAF_BUILD_FUZZ.
-place=build/asan
-if ! compgen -G 'build/asan/fuzz/*_fuzz' >/dev/null; then
-  place=build/fuzz
-  compiler=$(scripts/find-fuzz-compiler.sh)
-  if [ -z "$compiler" ]; then
-    echo "fuzz: no clang with libFuzzer here: NOT RUN"
-    exit 0
+mkdir -p build
+compiler=
+for candidate in clang++-{20,19,18,17,16,15,14} clang++; do
+  if command -v "$candidate" >/dev/null &&
+    printf '#include <string>\nextern "C" int LLVMFuzzerTestOneInput(const unsigned char*, unsigned long n) { return std::string(n, 0).size() != n; }\n' |
+    "$candidate" -std=c++20 -fsanitize=fuzzer,address,undefined -x c++ - -o build/fuzz-probe 2>/dev/null; then
+    compiler=$candidate
+    break
   fi
-  scripts/build.sh fuzz --target fuzz/all -DCMAKE_CXX_COMPILER="$compiler"
+done
+if [ -z "$compiler" ]; then
+  echo "fuzz: no clang with libFuzzer here: NOT RUN"
+  exit 0
 fi
-mkdir -p build/fuzz
-mapfile -t targets < <(find $place/fuzz -maxdepth 1 -type f -executable -name '*fuzz*' | sort)
+
+scripts/build.sh fuzz --target fuzz/all -DCMAKE_CXX_COMPILER="$compiler"
+mapfile -t targets < <(find build/fuzz/fuzz -maxdepth 1 -type f -executable -name '*fuzz*' | sort)
 if [ ${#targets[@]} = 0 ]; then
   echo "fuzz: no target was built" >&2
   exit 1

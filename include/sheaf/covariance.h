@@ -103,7 +103,8 @@ struct Covariance {
   /// Of each lens (n + 6) x (n + 6), its parameters and then the mean (rho, phi) of the images that
   /// see something through it; empty where it was not asked for.
   std::vector<std::vector<double>> lens_motions;
-  /// Of each of image_pairs: (rho, phi) of the first (rows) by those of the second.
+  /// Of each of image_pairs: (rho, phi) of the first (rows) by those of the second; not numbers
+  /// where one of them is not determined.
   std::vector<Covariance6> pairs;
   std::vector<Distance> distances;  ///< of each of image_pairs
   /// Of each point, or of point_ids in their order; not finite where a point is not determined.

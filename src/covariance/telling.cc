@@ -158,7 +158,16 @@ class Telling {
       for (double& x : C) x *= variance_;
       out_.distances.push_back(
           distance_of(options_.image_pairs[k], unscaled(a, a), common, unscaled(b, b)));
+      if (is_determined(joint_.functions[a]) && is_determined(joint_.functions[b])) continue;
+      C.fill(std::numeric_limits<double>::quiet_NaN());
+      out_.distances.back().sigma = kInfinite;
     }
+  }
+  bool is_determined(const LinearFunction& function) const {
+    for (const LinearPart& part : function.parts)
+      for (std::int32_t c = blocks_.first[part.block]; c < blocks_.first[part.block + 1]; ++c)
+        if (!inverse_.determined(c)) return false;
+    return true;
   }
   Covariance6 unscaled(std::size_t a, std::size_t b) const {
     Covariance6 out;

@@ -18,8 +18,6 @@ namespace sheaf {
 /// a reader sets them.
 class ArchiveWriter {
  public:
-  static constexpr bool kReads = false;
-
   template <class... Fields>
   void operator()(const Fields&... fields) {
     (put(fields), ...);
@@ -65,16 +63,12 @@ class ArchiveWriter {
 /// the first field on that is not there or makes no sense nothing is set.
 class ArchiveReader {
  public:
-  static constexpr bool kReads = true;
   explicit ArchiveReader(std::string_view bytes) : bytes_(bytes) {}
 
   template <class... Fields>
   void operator()(Fields&... fields) {
     (get(fields), ...);
   }
-  /// Refuses what was read last.
-  void fail() { ok_ = false; }
-  bool ok() const { return ok_; }
   /// Whether all was read and nothing is left.
   bool complete() const { return ok_ && bytes_.empty(); }
 
@@ -91,7 +85,7 @@ class ArchiveReader {
       std::memcpy(&value, bytes_.data(), sizeof value);
       bytes_.remove_prefix(sizeof value);
     } else if constexpr (std::is_enum_v<T>) {
-      // Names are checked by who knows them all; here that the number fits its own type.
+      // Whether it is one of the names is for the caller to know.
       std::underlying_type_t<T> number{};
       get(number);
       value = static_cast<T>(number);
@@ -131,6 +125,7 @@ class ArchiveReader {
       for (std::uint64_t k = 0; k < count && ok_; ++k) get(values.emplace_back());
     }
   }
+  void fail() { ok_ = false; }
   bool has(std::size_t size) {
     if (!ok_ || bytes_.size() < size) ok_ = false;
     return ok_;

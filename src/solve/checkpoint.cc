@@ -79,8 +79,6 @@ bool makes_sense(const Checkpoint& c, const Problem& problem) {
          c.progress.returns >= 0;
 }
 
-}  // namespace
-
 std::string fingerprint(const Problem& problem, const Fixed& fixed) {
   ArchiveWriter a;
   a(state_hash(problem), problem.observation_sigma);
@@ -90,14 +88,20 @@ std::string fingerprint(const Problem& problem, const Fixed& fixed) {
   return digest_of(a.bytes());
 }
 
-void put_options(const SolveOptions& options, const std::string& simd, Checkpoint& to) {
+}  // namespace
+
+Checkpoint identity_of(const Problem& problem, const SolveOptions& options,
+                       const std::string& simd) {
+  Checkpoint out;
+  out.problem = fingerprint(problem, options.fixed);
   for (const OptionField<SolveOptions>& field : solve_fields()) {
     if (!matters(field.spec.name)) continue;
-    to.names.push_back(field.spec.name);
-    to.values.push_back(text_of(field.get(options)));
+    out.names.push_back(field.spec.name);
+    out.values.push_back(text_of(field.get(options)));
   }
-  to.names.push_back("simd");
-  to.values.push_back(simd);
+  out.names.push_back("simd");
+  out.values.push_back(simd);
+  return out;
 }
 
 Result<void> write_checkpoint(const Checkpoint& checkpoint, const std::string& path) {

@@ -32,17 +32,15 @@ struct Checkpoint {
   double initial_damping = 0;
 };
 
-/// Of all that steps depend on beside the options of the table: measurements, state, rigs, terms,
-/// what is held.
-std::string fingerprint(const Problem& problem, const Fixed& fixed);
-
-/// Names and values of the options that steps depend on, with the instruction set that is used.
-void put_options(const SolveOptions& options, const std::string& simd, Checkpoint& to);
+/// A checkpoint that has but what a run is: the fingerprint of measurements, state, rigs, terms and
+/// what is held, and the options that steps depend on, with the instruction set that is used.
+Checkpoint identity_of(const Problem& problem, const SolveOptions& options,
+                       const std::string& simd);
 
 /// Written beside and renamed. Errors: unwritable_output.
 Result<void> write_checkpoint(const Checkpoint& checkpoint, const std::string& path);
 
-/// `expected` has the problem's fingerprint and the options. Errors: unreadable_input for what is
+/// `expected`: of identity_of. Errors: unreadable_input for what is
 /// no whole checkpoint of this version, usage, naming it, where problem or options are others.
 Result<Checkpoint> read_checkpoint(const std::string& path, const Checkpoint& expected,
                                    const Problem& problem);

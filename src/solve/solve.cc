@@ -130,9 +130,8 @@ std::vector<std::uint8_t> held_out(const Problem& problem, const SolveOptions& o
 class Attempts {
  public:
   Attempts(Problem& problem, const SolveOptions& options, const Kernels& kernels,
-           const Stopwatch& clock, Summary& summary)
+           const Checkpoint& identity, const Stopwatch& clock, Summary& summary)
       : problem_(problem),
-        asked_(options),
         options_(options),
         kernels_(kernels),
         clock_(clock),
@@ -140,7 +139,7 @@ class Attempts {
         threads_(options.threads),
         skip_(held_out(problem, options, threads_, summary)),
         used_(problem.num_observations() - summary.rejected_observations.size()),
-        fingerprint_(options.checkpoint.empty() ? "" : fingerprint(problem, options.fixed)) {
+        identity_(identity) {
     if (options_.initial_damping == 0)
       options_.initial_damping = default_damping(problem.num_images());
   }
@@ -227,12 +226,13 @@ class Attempts {
       if (first && build.lends()) summary_.behind_camera_before = behind_camera(problem_, threads_);
       std::optional<LentObservations> lent;
       if (build.lends()) build.lend(problem_, lent);
+      const bool begins = first || held_.has_value();
       const Result<std::unique_ptr<Home>> made = make_home(build);
       if (!made.ok()) return made.error();
       const std::unique_ptr<Home>& home = made.value();
       if (first && !build.lends() && home->count_behind() > 0)
         summary_.behind_camera_before = behind_camera(problem_, threads_);
-      if (first || summary_.resumed_after >= 0) summary_.setup_s = clock_.seconds();
+      if (begins) summary_.setup_s = clock_.seconds();
       const Hooks hooks{[&] { return find_better(build, *home); },
                         [&](double iterations) { return change_solver(build, *home, iterations); },
                         &progress_, [&] { write_down(*home); }};
@@ -287,9 +287,7 @@ class Attempts {
     if (options_.checkpoint.empty() || !history_) return;
     const double now = clock_.seconds();
     if (!out_of_time() && now - written_s_ < options_.checkpoint_every_s) return;
-    Checkpoint out;
-    out.problem = fingerprint_;
-    put_options(asked_, kernels_.name, out);
+    Checkpoint out = identity_;
     out.summary = summary_;
     out.loop = *history_;
     out.progress = progress_;
@@ -404,7 +402,6 @@ class Attempts {
   }
 
   Problem& problem_;
-  const SolveOptions& asked_;
   SolveOptions options_;  ///< with what the run changes
   const Kernels& kernels_;
   const Stopwatch& clock_;
@@ -416,7 +413,7 @@ class Attempts {
   Estimate start_, reached_;        ///< of the attempt, when a better one was sought
   bool seeks_ = false;              ///< a better one is to be sought once the home is gone
   std::optional<LoopHistory> history_;
-  const std::string fingerprint_;
+  const Checkpoint& identity_;  ///< of the run, where it is written down
   RunProgress progress_;
   double written_s_ = 0;  ///< when the last checkpoint was
   // Of a checkpoint, until its home is made.
@@ -435,19 +432,19 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   place_images(problem);
+  Checkpoint identity;
+  if (!options.checkpoint.empty() || !options.resume.empty())
+    identity = identity_of(problem, options, kernels.value()->name);
   std::optional<Checkpoint> from;
   if (!options.resume.empty()) {
-    Checkpoint expected;
-    expected.problem = fingerprint(problem, options.fixed);
-    put_options(options, kernels.value()->name, expected);
-    Result<Checkpoint> read = read_checkpoint(options.resume, expected, problem);
+    Result<Checkpoint> read = read_checkpoint(options.resume, identity, problem);
     if (!read.ok()) return read.error();
     from = std::move(read).value();
   }
   summary.initial_terms = evaluate_terms(problem);
   const double rms_before_px = plain_rms_px(problem);
   try {
-    Attempts attempts(problem, options, *kernels.value(), clock, summary);
+    Attempts attempts(problem, options, *kernels.value(), identity, clock, summary);
     if (from) attempts.resume(std::move(*from));
     const Result<void> done = attempts.run();
     if (!done.ok()) return done.error();

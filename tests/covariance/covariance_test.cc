@@ -332,8 +332,12 @@ TEST(Covariance, WhatIsNotDeterminedIsSaid) {
   const std::uint32_t lone = p.add_point(0.1, 0.2, 0.3);
   p.add_observation(0, lone, 500, 400);
   const std::uint32_t blind = p.add_image(p.poses[0], 0u);
-  const Covariance c = covariance(p).value();
+  CovarianceOptions options;
+  options.image_pairs = {{0, blind}, {0, 1}};
+  const Covariance c = covariance(p, options).value();
   EXPECT_EQ(c.undetermined_points, 1u);
+  EXPECT_TRUE(std::isinf(c.distances[0].sigma) && std::isnan(c.pairs[0][0]));
+  EXPECT_TRUE(c.distances[1].sigma > 0 && std::isfinite(c.distances[1].sigma));
   EXPECT_TRUE(std::isinf(c.points[lone][0]));
   EXPECT_TRUE(std::isinf(c.poses[blind][0]));
   EXPECT_TRUE(std::isfinite(c.poses[0][0]) && std::isfinite(c.points[0][0]));
