@@ -103,6 +103,12 @@ Json loss_json(const Summary& s) {
           {"rounds", rounds}};
 }
 
+Json checkpoints_json(const Summary& s) {
+  return {{"written", s.checkpoints},
+          {"failure", s.checkpoint_failure.empty() ? Json() : Json(s.checkpoint_failure)},
+          {"resumed_after", s.resumed_after < 0 ? Json() : Json(s.resumed_after)}};
+}
+
 Json counts_json(const Problem& problem) {
   return {{"cameras", problem.cameras.size()},
           {"poses", problem.num_images()},
@@ -201,10 +207,7 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
       {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
       {"iterations", iterations_json(s)},
       {"recoveries", recoveries_json(s)},
-      {"checkpoints",
-       {{"written", s.checkpoints},
-        {"failure", s.checkpoint_failure.empty() ? Json() : Json(s.checkpoint_failure)},
-        {"resumed_after", s.resumed_after < 0 ? Json() : Json(s.resumed_after)}}},
+      {"checkpoints", checkpoints_json(s)},
       {"time",
        {{"read_s", record.read_s},
         {"setup_s", s.setup_s},

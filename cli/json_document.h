@@ -35,6 +35,7 @@ Json iterations_json(const Summary& summary);
 Json changes_json(const Summary& summary);
 Json recoveries_json(const Summary& summary);
 Json loss_json(const Summary& summary);
+Json checkpoints_json(const Summary& summary);
 
 /// What the JSON of a solve is made of.
 struct SolveRecord {

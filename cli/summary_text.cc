@@ -39,6 +39,15 @@ std::string loss_text(const Summary& s) {
 
 }  // namespace
 
+std::string checkpoints_text(const Summary& s) {
+  std::string out;
+  if (s.resumed_after >= 0)
+    out += fmt::format("resumed     after step {} of a checkpoint\n", s.resumed_after);
+  if (!s.checkpoint_failure.empty())
+    out += fmt::format("note        no checkpoint could be written: {}\n", s.checkpoint_failure);
+  return out;
+}
+
 std::string summary_text(const Summary& s, double read_s) {
   const auto steps = s.iterations.empty() ? 0 : s.iterations.size() - 1;
   const auto rejected = std::count_if(s.iterations.begin(), s.iterations.end(),
@@ -55,10 +64,7 @@ std::string summary_text(const Summary& s, double read_s) {
     out += fmt::format("rms         {:.6g} -> {:.6g} px\n", s.initial_rms_px, s.final_rms_px);
   out += fmt::format("iterations  {}{}\n", steps,
                      rejected > 0 ? fmt::format(" ({} rejected)", rejected) : "");
-  if (s.resumed_after >= 0)
-    out += fmt::format("resumed     after step {} of a checkpoint\n", s.resumed_after);
-  if (!s.checkpoint_failure.empty())
-    out += fmt::format("note        no checkpoint could be written: {}\n", s.checkpoint_failure);
+  out += checkpoints_text(s);
   for (const Recovery& r : s.recoveries)
     out += fmt::format(
         "recovery    after step {}: {} passes of resection and intersection, {}, cost {:.6g} -> "

@@ -12,6 +12,9 @@ namespace sheaf {
 /// "16 images, 22106 points, 83718 observations"
 std::string counts_text(const Problem& problem);
 
+/// Lines on a checkpoint that was gone on from, and on one that could not be written; or none.
+std::string checkpoints_text(const Summary& summary);
+
 /// A few lines for people: costs, iterations, the reason for stopping.
 std::string summary_text(const Summary& summary, double read_s);
 

@@ -13,6 +13,7 @@
 #include "progress.h"
 #include "sheaf/sheaf.h"
 #include "step_log.h"
+#include "summary_text.h"
 #include "terminal.h"
 #include "timer.h"
 #include "verb.h"
@@ -49,6 +50,7 @@ std::string summary_text(const PhotometricSummary& summary, const PhotometricDet
     out += fmt::format("anchor      {} measured positions, rms {:.5g} -> {:.5g} px\n",
                        summary.measurements, summary.initial_rms_px, summary.final_rms_px);
   out += fmt::format("iterations  {}\n", s.iterations.empty() ? 0 : s.iterations.size() - 1);
+  out += checkpoints_text(s);
   out += fmt::format("stopped     {}\n", s.words);
   out +=
       fmt::format("memory      {:.0f} MB forecast\n", 1e-6 * static_cast<double>(s.forecast_bytes));
@@ -79,15 +81,19 @@ std::vector<std::string> images_without_patches(const PhotometricFolder& folder,
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
-  PhotometricOutputs outputs(arguments.outputs, arguments.common.json,
-                             {arguments.in, arguments.photometric.read.images.string()});
+  PhotometricOptions options = arguments.photometric.options;
+  PhotometricOutputs outputs(
+      arguments.outputs, {{"--json", arguments.common.json}, {"--checkpoint", options.checkpoint}},
+      {arguments.in, arguments.photometric.read.images.string(),
+       options.resume != options.checkpoint ? options.resume : ""});
+  interrupt.limit(options.time_limit_s);
   PhotometricFolder folder = read_photometric(arguments.in, arguments.photometric.read).value();
   std::optional<PoseErrors> before, after;
   if (!folder.given_poses.empty()) before = pose_errors(folder);
   PhotometricProblem& problem = folder.problem;
-  Progress progress(arguments.common.quiet);
+  Progress progress(arguments.common.quiet,
+                    {options.max_iterations, options.tolerance, interrupt.left_s()});
   StepLog log(arguments.outputs.log);
-  PhotometricOptions options = arguments.photometric.options;
   options.threads = arguments.common.threads;
   options.stop = interrupt.token();
   options.on_iteration = [&](const Iteration& iteration) {
@@ -97,8 +103,11 @@ int run(Arguments& arguments) {
   };
   outputs.remember(problem, options);
   interrupt.begin_solve();
+  progress.begin();
+  options.time_limit_s = interrupt.left_s();
   const PhotometricSummary summary = refine_photometric(problem, options).value();
   interrupt.begin_write();
+  progress.end();
   if (before) after = pose_errors(folder);
   const Timer writing;
   if (!summary.solve.rounds.empty()) options.loss.scale_px = summary.solve.rounds.back().scale_px;

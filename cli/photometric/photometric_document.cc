@@ -87,6 +87,7 @@ Json photometric_json(const PhotometricRecord& record, const PhotometricSummary&
       {"poses", pose_errors_json(record.before, record.after)},
       {"termination", {{"code", to_string(s.termination)}, {"words", s.words}}},
       {"iterations", iterations_json(s)},
+      {"checkpoints", checkpoints_json(s)},
       {"time",
        {{"read_s", record.read_s},
         {"setup_s", s.setup_s},

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "io/folder_files.h"
-#include "outputs.h"
 #include "report/photometric_pictures.h"
 #include "sheaf/solve.h"
 #include "verb.h"
@@ -36,15 +35,16 @@ std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments) {
 }
 
 PhotometricOutputs::PhotometricOutputs(const PhotometricOutputArguments& arguments,
-                                       const std::string& json,
+                                       const std::vector<NamedOutput>& others,
                                        const std::vector<std::string>& inputs)
     : arguments_(arguments) {
-  check_outputs({{.option = "-o", .path = arguments_.out, .folder = true},
-                 {.option = "--pictures", .path = arguments_.pictures, .folder = true},
-                 {"--ply", arguments_.ply},
-                 {"--json", json},
-                 {"--log", arguments_.log}},
-                inputs);
+  std::vector<NamedOutput> all = {
+      {.option = "-o", .path = arguments_.out, .folder = true},
+      {.option = "--pictures", .path = arguments_.pictures, .folder = true},
+      {"--ply", arguments_.ply},
+      {"--log", arguments_.log}};
+  all.insert(all.end(), others.begin(), others.end());
+  check_outputs(all, inputs);
 }
 
 void PhotometricOutputs::remember(const PhotometricProblem& start,

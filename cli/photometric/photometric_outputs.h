@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "options/option_field.h"
+#include "outputs.h"
 #include "report/patch_comparison.h"
 #include "sheaf/io.h"
 #include "sheaf/photometric.h"
@@ -22,8 +23,10 @@ std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments);
 /// Holds what outputs need of the start until the result is there. Errors are thrown.
 class PhotometricOutputs {
  public:
-  /// Before anything is computed. inputs: what no output may be.
-  PhotometricOutputs(const PhotometricOutputArguments& arguments, const std::string& json,
+  /// Before anything is computed. others: outputs that it does not write; inputs: what no output
+  /// may be.
+  PhotometricOutputs(const PhotometricOutputArguments& arguments,
+                     const std::vector<NamedOutput>& others,
                      const std::vector<std::string>& inputs);
 
   void remember(const PhotometricProblem& start, const PhotometricOptions& options);

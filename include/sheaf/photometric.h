@@ -157,6 +157,10 @@ struct PhotometricOptions {
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   std::function<bool(const Iteration&)> on_iteration{};  ///< return false to stop
   StopToken stop{};
+  /// As SolveOptions has them.
+  std::string checkpoint{};
+  double checkpoint_every_s = 60;
+  std::string resume{};
 };
 
 /// A patch in an image that shows it.

@@ -164,8 +164,8 @@ Table library_fields() {
 
 Table make_table() {
   Table table;
-  for (const Table& part :
-       {model_fields(), patch_fields(), anchor_fields(), limit_fields(), library_fields()})
+  for (const Table& part : {model_fields(), patch_fields(), anchor_fields(), limit_fields(),
+                            Shared::checkpoints(), library_fields()})
     table.insert(table.end(), part.begin(), part.end());
   return table;
 }

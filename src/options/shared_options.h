@@ -29,13 +29,14 @@ struct SharedFields {
                     .help = "stop when the relative decrease of the cost stays below this twice"});
   }
   static Field time_limit() {
-    return F::limit(&Options::time_limit_s,
-                    {.name = "time-limit",
-                     .placeholder = "SECONDS",
-                     .unit = "s",
-                     .range = above(0),
-                     .help = "stop after this long, set-up included, write the best state and exit "
-                             "with 7"});
+    return F::limit(
+        &Options::time_limit_s,
+        {.name = "time-limit",
+         .placeholder = "SECONDS",
+         .unit = "s",
+         .range = above(0),
+         .help = "stop after this long (of the command, reading included; of a library's "
+                 "call, set-up included), write the best state and exit with 7"});
   }
   /// `how` says what is done about a forecast over the limit.
   static Field memory_limit(const std::string& how) {
@@ -64,6 +65,25 @@ struct SharedFields {
                                                .placeholder = "LAMBDA",
                                                .range = from(0),
                                                .help = "of the first step; 0: chosen by rule"});
+  }
+  static OptionTable<Options> checkpoints() {
+    return {
+        F::text(&Options::checkpoint,
+                {.name = "checkpoint",
+                 .placeholder = "FILE",
+                 .help = "write the run down between two steps, now and then and where it is to "
+                         "stop, so that it can be gone on with"}),
+        F::real(&Options::checkpoint_every_s, {.name = "checkpoint-every",
+                                               .placeholder = "SECONDS",
+                                               .unit = "s",
+                                               .range = from(0),
+                                               .help = "so often; 0: before each step"}),
+        F::text(&Options::resume,
+                {.name = "resume",
+                 .placeholder = "FILE",
+                 .help = "go on from a checkpoint of the same problem and options, to the end of "
+                         "the run that was never stopped, bit for bit"}),
+    };
   }
   static Field threads() {
     return F::whole(&Options::threads,

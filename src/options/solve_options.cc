@@ -92,27 +92,6 @@ Table solver_fields() {
   };
 }
 
-Table checkpoint_fields() {
-  return {
-      F::text(
-          &SolveOptions::checkpoint,
-          {.name = "checkpoint",
-           .placeholder = "FILE",
-           .help = "write the run down between two steps, now and then and where it is to stop, "
-                   "so that it can be gone on with"}),
-      F::real(&SolveOptions::checkpoint_every_s, {.name = "checkpoint-every",
-                                                  .placeholder = "SECONDS",
-                                                  .unit = "s",
-                                                  .range = from(0),
-                                                  .help = "so often; 0: before each step"}),
-      F::text(&SolveOptions::resume,
-              {.name = "resume",
-               .placeholder = "FILE",
-               .help = "go on from a checkpoint of the same problem and options, to the end of the "
-                       "run that was never stopped, bit for bit"}),
-  };
-}
-
 /// What a program sets and the command does by itself.
 Table library_fields() {
   return {
@@ -130,7 +109,8 @@ Table library_fields() {
 
 Table make_table() {
   Table table = {Shared::max_iterations(), Shared::tolerance(), Shared::time_limit()};
-  for (const Table& part : {model_fields(), solver_fields(), checkpoint_fields(), library_fields()})
+  for (const Table& part :
+       {model_fields(), solver_fields(), Shared::checkpoints(), library_fields()})
     table.insert(table.end(), part.begin(), part.end());
   return table;
 }

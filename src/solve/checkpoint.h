@@ -7,6 +7,7 @@
 
 #include "sheaf/error.h"
 #include "sheaf/solve.h"
+#include "solve/checkpoint_file.h"
 #include "solve/trust_region.h"
 #include "starts/sights.h"
 #include "systems/home.h"
@@ -16,8 +17,7 @@ namespace sheaf {
 /// A run before one of its steps: with the same problem and options another process goes on from it
 /// to the bits of the run that was never stopped.
 struct Checkpoint {
-  std::string problem;                     ///< its fingerprint
-  std::vector<std::string> names, values;  ///< of options that steps depend on
+  RunIdentity identity;
   Summary summary;
   LoopHistory loop;
   RunProgress progress;
@@ -32,17 +32,16 @@ struct Checkpoint {
   double initial_damping = 0;
 };
 
-/// A checkpoint that has but what a run is: the fingerprint of measurements, state, rigs, terms and
-/// what is held, and the options that steps depend on, with the instruction set that is used.
-Checkpoint identity_of(const Problem& problem, const SolveOptions& options,
-                       const std::string& simd);
+/// With the fingerprint of measurements, state, rigs, terms and what is held.
+RunIdentity identity_of(const Problem& problem, const SolveOptions& options,
+                        const std::string& simd);
 
 /// Written beside and renamed. Errors: unwritable_output.
 Result<void> write_checkpoint(const Checkpoint& checkpoint, const std::string& path);
 
-/// `expected`: of identity_of. Errors: unreadable_input for what is
-/// no whole checkpoint of this version, usage, naming it, where problem or options are others.
-Result<Checkpoint> read_checkpoint(const std::string& path, const Checkpoint& expected,
+/// Errors: unreadable_input for what is no whole checkpoint of this version, usage, naming it,
+/// where problem or options are others.
+Result<Checkpoint> read_checkpoint(const std::string& path, const RunIdentity& expected,
                                    const Problem& problem);
 
 }  // namespace sheaf

@@ -163,9 +163,13 @@ void archive(A& a, Estimate& x) {
   a(x.poses, x.cameras, x.points, x.sensors, x.frames);
 }
 template <class A>
+void archive(A& a, RunIdentity& x) {
+  a(x.problem, x.names, x.values);
+}
+template <class A>
 void archive(A& a, Checkpoint& x) {
-  a(x.problem, x.names, x.values, x.summary, x.loop, x.progress, x.home, x.attempt_start, x.cameras,
-    x.points, x.recoveries, x.solver, x.initial_damping);
+  a(x.identity, x.summary, x.loop, x.progress, x.home, x.attempt_start, x.cameras, x.points,
+    x.recoveries, x.solver, x.initial_damping);
 }
 
 }  // namespace sheaf

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "eliminate/kernel_table.h"
@@ -15,6 +16,7 @@
 #include "solve/patch_anchor.h"
 #include "solve/patch_level.h"
 #include "solve/patch_statistics.h"
+#include "solve/photometric_checkpoint.h"
 #include "solve/photometric_forecast.h"
 #include "solve/photometric_rules.h"
 #include "solve/trust_region.h"
@@ -32,6 +34,8 @@ class Refinement {
         pattern_(pattern),
         threads_(options.threads),
         kernels_(*available_kernels().front()),
+        identity_(keeps_checkpoints() ? identity_of(problem, options, kernels_.name)
+                                      : RunIdentity{}),
         rays_(uses_rays(problem, options)),
         measurements_(measurements_of(problem, options)),
         state_(state_of(problem, rays_)) {}
@@ -42,7 +46,13 @@ class Refinement {
     return summary_.solve.forecast_bytes = std::max(peak_resident_bytes(), resident_bytes() + more);
   }
 
-  PhotometricSummary run() {
+  Result<PhotometricSummary> run() {
+    if (!options_.resume.empty()) {
+      Result<PhotometricCheckpoint> from =
+          read_checkpoint(options_.resume, identity_, problem_, options_.levels);
+      if (!from.ok()) return from.error();
+      from_ = std::move(from).value();
+    }
     Summary& solve = summary_.solve;
     solve.simd = kernels_.name;
     solve.threads = threads_.count();
@@ -56,9 +66,11 @@ class Refinement {
     statistics.measure_before(state_);
     summary_.measurements = measurements_.size();
     summary_.initial_rms_px = rms_of(measurements_, finest, state_);
-    for (int level = options_.levels - 1; level > 0; --level)
+    if (from_) take_up();
+    for (int level = from_ ? from_->round.level : options_.levels - 1; level > 0; --level)
       if (!refine(scene_of_level(problem_, options_, pattern_, level), level)) break;
-    if (options_.levels == 1 || converged()) refine(finest, 0);
+    if (options_.levels == 1 || from_ || converged()) refine(finest, 0);
+    if (foreign_) return senseless_checkpoint(options_.resume);
     solve.solve_s = clock_.seconds() - solve.setup_s;
     statistics.measure_after(state_);
     summary_.final_rms_px = rms_of(measurements_, finest, state_);
@@ -68,6 +80,44 @@ class Refinement {
   }
 
  private:
+  bool keeps_checkpoints() const {
+    return !options_.checkpoint.empty() || !options_.resume.empty();
+  }
+
+  /// What another process knew, but for the state, which descend() takes.
+  void take_up() {
+    const std::string simd = summary_.solve.simd;
+    const std::uint64_t forecast = summary_.solve.forecast_bytes;
+    summary_.solve = std::move(from_->solve);
+    summary_.solve.simd = simd;
+    summary_.solve.threads = threads_.count();
+    summary_.solve.forecast_bytes = forecast;
+    summary_.solve.resumed_after = summary_.solve.iterations.back().index;
+    summary_.anchor_sigma_grey = from_->round.anchor_sigma_grey;
+    brightness_fitted_ = from_->brightness_fitted;
+    sigma_ = from_->sigma_grey;
+    progress_ = from_->progress;
+    progress_.resumes = true;
+  }
+
+  /// A checkpoint, where it is time for one. A run that is to stop leaves where it stands.
+  void write_down(const PhotometricSystem& system) {
+    const double now = clock_.seconds();
+    const bool stops = options_.stop.stop_requested() || now >= options_.time_limit_s;
+    if (options_.checkpoint.empty() || !history_) return;
+    if (!stops && now - written_s_ < options_.checkpoint_every_s) return;
+    Summary& solve = summary_.solve;
+    const Result<void> done =
+        write_checkpoint({identity_, solve, *history_, progress_, system.history(), round_,
+                          system.state(), system.leaving(), brightness_fitted_, sigma_},
+                         options_.checkpoint);
+    if (done.ok())
+      ++solve.checkpoints;
+    else
+      solve.checkpoint_failure = done.error().what();
+    written_s_ = clock_.seconds();
+  }
+
   /// Nothing says where anything is.
   PhotometricSummary unseen() {
     Summary& solve = summary_.solve;
@@ -130,18 +180,28 @@ class Refinement {
   /// Rounds of steps on one level, each with the patches seen at its start, until these stay the
   /// same. False when the run is to end.
   bool refine(const PatchScene& scene, int level) {
-    std::vector<Sight> sights = sights_of_round(scene);
-    const ScaledLoss loss = scaled_loss(scene, sights);
-    double anchor_sigma = sigma_of_anchor(scene, sights);
-    for (int round = 1; descend(scene, sights, loss, level, anchor_sigma); ++round) {
-      if (round >= options_.rounds) return true;
+    for (const ScaledLoss loss = begin_level(scene, level); descend(scene, loss); ++round_.number) {
+      if (round_.number >= options_.rounds) return true;
       std::vector<Sight> next = sights_of_round(scene);
       const double next_sigma = sigma_of_anchor(scene, next);
-      if (!differ(sights, next) && !differ(anchor_sigma, next_sigma)) return true;
-      sights = std::move(next);
-      anchor_sigma = next_sigma;
+      if (!differ(round_.sights, next) && !differ(round_.anchor_sigma_grey, next_sigma))
+        return true;
+      round_.sights = std::move(next);
+      round_.anchor_sigma_grey = next_sigma;
     }
     return false;
+  }
+
+  /// Its first round, or the one that another process was in.
+  ScaledLoss begin_level(const PatchScene& scene, int level) {
+    if (from_) {
+      round_ = std::move(from_->round);
+      return scaled_for(options_, pattern_, sigma_);
+    }
+    round_ = {level, 1, sights_of_round(scene), 0, {}};
+    const ScaledLoss loss = scaled_loss(scene, round_.sights);
+    round_.anchor_sigma_grey = sigma_of_anchor(scene, round_.sights);
+    return loss;
   }
 
   /// A pixel's standard deviation as a measured position is weighed against it. Unlike the loss's
@@ -189,20 +249,24 @@ class Refinement {
   }
 
   /// Steps until they converge; false where they did not.
-  bool descend(const PatchScene& scene, const std::vector<Sight>& sights, const ScaledLoss& loss,
-               int level, double anchor_sigma) {
+  bool descend(const PatchScene& scene, const ScaledLoss& loss) {
     Summary& solve = summary_.solve;
-    Anchor anchor = anchor_of_level(measurements_, scene, state_, options_, level, anchor_sigma);
-    PhotometricSystem system(scene, state_, sights, rules(), kernels_, threads_, std::move(anchor));
-    if (solve.rounds.empty()) solve.setup_s = clock_.seconds();
+    if (from_)
+      state_ = std::move(from_->held);
+    else
+      round_.start = state_;
+    Anchor anchor = anchor_of_level(measurements_, scene, round_.start, options_, round_.level,
+                                    round_.anchor_sigma_grey);
+    PhotometricSystem system(scene, state_, round_.sights, rules(), kernels_, threads_,
+                             std::move(anchor));
+    if (solve.rounds.empty() || from_) solve.setup_s = clock_.seconds();
     solve.solver = system.solver_name();
-    LossRound round;
-    round.scale_px = loss.kind == LossKind::none ? 0 : loss.scale_px;
-    round.sigma_px = sigma_;
-    solve.rounds.push_back(round);
-    const std::size_t before = solve.iterations.size();
-    minimize(system, loss, loop_options(level), clock_, solve,
-             level > 0 ? kCoarseMotion : options_.motion_px);
+    if (!begin_round(system, loss)) return false;
+    const Hooks hooks{[] { return Recourse::none; }, [](double) { return false; }, &progress_,
+                      [&] { write_down(system); }};
+    minimize(system, loss, loop_options(round_.level), clock_, solve,
+             round_.level > 0 ? kCoarseMotion : options_.motion_px, &history_, &hooks);
+    const std::size_t before = progress_.round_begin;
     LossRound& now = solve.rounds.back();
     now.initial_cost =
         before < solve.iterations.size() ? solve.iterations[before].start_cost : solve.final_cost;
@@ -210,6 +274,25 @@ class Refinement {
     now.steps = static_cast<int>(solve.iterations.size() - before) - (before == 0);
     state_ = system.state();
     return converged();
+  }
+
+  /// False where it is to go on from what is of another system.
+  bool begin_round(PhotometricSystem& system, const ScaledLoss& loss) {
+    Summary& solve = summary_.solve;
+    history_.reset();
+    if (from_) {
+      foreign_ = !system.resume(from_->leaving, from_->home);
+      history_ = from_->loop;
+      from_.reset();
+      return !foreign_;
+    }
+    LossRound round;
+    round.scale_px = loss.kind == LossKind::none ? 0 : loss.scale_px;
+    round.sigma_px = sigma_;
+    solve.rounds.push_back(round);
+    progress_ = {};
+    progress_.round_begin = solve.iterations.size();
+    return true;
   }
 
   bool converged() const {
@@ -237,11 +320,18 @@ class Refinement {
   const Pattern pattern_;
   Threads threads_;
   const Kernels& kernels_;
+  const RunIdentity identity_;  ///< where the run is written down, or goes on
   const bool rays_;
   const std::vector<Measurement> measurements_;
   PatchState state_;
   bool brightness_fitted_ = false;
   double sigma_ = 0;
+  PatchRound round_;
+  std::optional<LoopHistory> history_;  ///< of the round
+  RunProgress progress_;
+  double written_s_ = 0;                       ///< when the last checkpoint was
+  std::optional<PhotometricCheckpoint> from_;  ///< until its round goes on
+  bool foreign_ = false;                       ///< it was of other patches
   PhotometricSummary summary_;
 };
 

@@ -130,7 +130,7 @@ std::vector<std::uint8_t> held_out(const Problem& problem, const SolveOptions& o
 class Attempts {
  public:
   Attempts(Problem& problem, const SolveOptions& options, const Kernels& kernels,
-           const Checkpoint& identity, const Stopwatch& clock, Summary& summary)
+           const RunIdentity& identity, const Stopwatch& clock, Summary& summary)
       : problem_(problem),
         options_(options),
         kernels_(kernels),
@@ -287,7 +287,8 @@ class Attempts {
     if (options_.checkpoint.empty() || !history_) return;
     const double now = clock_.seconds();
     if (!out_of_time() && now - written_s_ < options_.checkpoint_every_s) return;
-    Checkpoint out = identity_;
+    Checkpoint out;
+    out.identity = identity_;
     out.summary = summary_;
     out.loop = *history_;
     out.progress = progress_;
@@ -413,7 +414,7 @@ class Attempts {
   Estimate start_, reached_;        ///< of the attempt, when a better one was sought
   bool seeks_ = false;              ///< a better one is to be sought once the home is gone
   std::optional<LoopHistory> history_;
-  const Checkpoint& identity_;  ///< of the run, where it is written down
+  const RunIdentity& identity_;  ///< of the run, where it is written down
   RunProgress progress_;
   double written_s_ = 0;  ///< when the last checkpoint was
   // Of a checkpoint, until its home is made.
@@ -432,7 +433,7 @@ Result<Summary> try_solve(Problem& problem, const SolveOptions& options) {
 
   Summary summary;
   place_images(problem);
-  Checkpoint identity;
+  RunIdentity identity;
   if (!options.checkpoint.empty() || !options.resume.empty())
     identity = identity_of(problem, options, kernels.value()->name);
   std::optional<Checkpoint> from;

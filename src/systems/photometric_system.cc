@@ -60,6 +60,15 @@ PhotometricSystem::PhotometricSystem(Parts parts, const PatchState& state, const
       kind_(parts.plan.kind),
       initial_points_(state.points) {}
 
+std::vector<double> PhotometricSystem::leaving() const {
+  const Buffer<double>& costs = pixels_.leaving();
+  return {costs.data(), costs.data() + costs.size()};
+}
+
+bool PhotometricSystem::resume(const std::vector<double>& leaving, const HomeHistory& history) {
+  return pixels_.take_leaving(leaving) && restore(history);
+}
+
 PatchState PhotometricSystem::state() const {
   PatchState out;
   for (const RigidMotion<double>& pose : cameras().poses)

@@ -28,6 +28,11 @@ class PhotometricSystem : public PointSystem {
   PatchState state() const;
   /// Patches outside of their image at the held state.
   std::uint64_t left() const { return pixels_.left(); }
+  /// What patches cost that leave their image, which the first step of a round finds.
+  std::vector<double> leaving() const;
+  /// Goes on from the held state, leaving costs and history of another system of the same scene,
+  /// sights and rules. False where they are of others.
+  bool resume(const std::vector<double>& leaving, const HomeHistory& history);
   const char* solver_name() const { return to_string(kind_); }
 
  private:

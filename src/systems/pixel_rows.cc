@@ -222,8 +222,11 @@ void PixelRows::hold(const ScaledLoss& loss) {
   const bool same_costs = collapsed_ && loss.kind == loss_.kind && loss.scale_px == loss_.scale_px;
   loss_ = loss;
   anchor_.loss.floor = loss.floor;
-  if (same_costs) {  // of the same patches: only what steps see of their curvature is new
+  // Of the same patches: only what steps see of their curvature is new.
+  if (same_costs || left_before_) {
     totals_ = collapse(state_->held, held_);
+    collapsed_ = true;
+    left_before_ = false;
     return;
   }
   leaving_.fill(0);
@@ -232,27 +235,6 @@ void PixelRows::hold(const ScaledLoss& loss) {
   if (rules_.leaving_is_free) return;
   set_leaving();
   if (totals_.left > 0) totals_ = collapse(state_->held, held_);
-}
-
-/// A patch that leaves costs as much as it does now, and no less than the mean does.
-void PixelRows::set_leaving() {
-  double sum[2] = {0, 0};
-  std::uint64_t count = 0;
-  const auto for_each_patch = [&](const auto& visit) {
-    for (const Batches::Group& group : batches_.groups)
-      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-        for (std::uint32_t l = 0; l < group.lanes; ++l) visit(16 * b + l);
-  };
-  for_each_patch([&](std::uint64_t at) {
-    if (std::isnan(held_.seen[at])) return;
-    sum[0] += held_.costs[at], sum[1] += held_.costs[at + 8];
-    ++count;
-  });
-  if (count == 0) return;
-  for_each_patch([&](std::uint64_t at) {
-    for (int k = 0; k < 2; ++k)
-      leaving_[at + 8 * k] = std::max(held_.costs[at + 8 * k], sum[k] / static_cast<double>(count));
-  });
 }
 
 /// What a patch says of its image's brightness alone.

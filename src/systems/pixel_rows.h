@@ -47,6 +47,11 @@ class PixelRows : public PointRows {
   bool blocks_are_images() const { return !blocks_.are_pairs(); }
   /// Patches outside of their image at the held state.
   std::uint64_t left() const { return totals_.left; }
+  /// What patches that leave cost, in the order of the arrangement; of another refinement that was
+  /// arranged likewise: taken in place of what a loss that is first used would find. False where
+  /// there are not as many.
+  const Buffer<double>& leaving() const { return leaving_; }
+  bool take_leaving(const std::vector<double>& costs);
 
   const Batches& batches() const override { return mixed_ ? mixed_->batches() : batches_; }
   const Chunks& chunks() const override { return chunks_; }
@@ -128,7 +133,8 @@ class PixelRows : public PointRows {
   Buffer<double> image_steps_, steps_;           ///< kBlockVector per image, per block
   Totals totals_, tried_totals_;
   ScaledLoss loss_;
-  bool collapsed_ = false;  ///< held_'s rows are those of its state with loss_
+  bool collapsed_ = false;    ///< held_'s rows are those of its state with loss_
+  bool left_before_ = false;  ///< leaving_ is another refinement's
 };
 
 }  // namespace sheaf

@@ -2,14 +2,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 // Points of patches under a loss: they go back where a step made them worse, and damp themselves.
-// docs/math.md, section 12, has the rule.
+// docs/math.md, section 12, has the rule. What patches cost that leave their image.
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "systems/pixel_rows.h"
 
 namespace sheaf {
+
+bool PixelRows::take_leaving(const std::vector<double>& costs) {
+  if (costs.size() != leaving_.size()) return false;
+  std::copy(costs.begin(), costs.end(), leaving_.data());
+  return left_before_ = true;
+}
+
+/// A patch that leaves costs as much as it does now, and no less than the mean does.
+void PixelRows::set_leaving() {
+  double sum[2] = {0, 0};
+  std::uint64_t count = 0;
+  const auto for_each_patch = [&](const auto& visit) {
+    for (const Batches::Group& group : batches_.groups)
+      for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
+        for (std::uint32_t l = 0; l < group.lanes; ++l) visit(16 * b + l);
+  };
+  for_each_patch([&](std::uint64_t at) {
+    if (std::isnan(held_.seen[at])) return;
+    sum[0] += held_.costs[at], sum[1] += held_.costs[at + 8];
+    ++count;
+  });
+  if (count == 0) return;
+  for_each_patch([&](std::uint64_t at) {
+    for (int k = 0; k < 2; ++k)
+      leaving_[at + 8 * k] = std::max(held_.costs[at + 8 * k], sum[k] / static_cast<double>(count));
+  });
+}
 
 /// Points whose patches and measurements rose by more than half of what their step promised go back
 /// to where they were, and damp themselves by more in the elimination to come; others by less.
