@@ -13,6 +13,7 @@
 #include "json_document.h"
 #include "matching_document.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "report/errors.h"
 #include "report/model_alignment.h"
 #include "scene/similarity.h"
@@ -145,7 +146,7 @@ SurveyMotionOptions motion_options(const Arguments& arguments) {
 }
 
 int run_to_survey(const Arguments& arguments, Interrupt& interrupt, const Timer& total) {
-  InputFile model = read_file(arguments.in, {.hash = !arguments.common.json.empty()}).value();
+  InputFile model = read_input(arguments.in, arguments.common);
   const Json input = arguments.common.json.empty() ? Json() : input_json(arguments.in, model);
   const std::string counts = counts_text(model.problem);
   const Constraints constraints = read_constraints(arguments.constraints);
@@ -166,9 +167,8 @@ int run_to_survey(const Arguments& arguments, Interrupt& interrupt, const Timer&
 }
 
 int run_to_reference(const Arguments& arguments, Interrupt& interrupt, const Timer& total) {
-  const ReadOptions hash{.hash = !arguments.common.json.empty()};
-  InputFile model = read_file(arguments.in, hash).value();
-  const InputFile reference = read_file(arguments.reference, hash).value();
+  InputFile model = read_input(arguments.in, arguments.common);
+  const InputFile reference = read_input(arguments.reference, arguments.common);
   const ModelAlignmentOptions options{
       .robust = !arguments.least_squares,
       .scale = arguments.rigid ? AlignScale::one : AlignScale::free};

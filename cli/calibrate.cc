@@ -130,6 +130,7 @@ int run(const Arguments& arguments) {
   interrupt.begin_solve();
   found.summary = refine(problem, arguments, interrupt, progress);
   interrupt.begin_write();
+  progress.end();
   CovarianceOptions options;
   options.fixed.points = true;
   options.fixed.parameters = {0};

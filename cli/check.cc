@@ -12,6 +12,7 @@
 #include "constraints_option.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "terminal.h"
@@ -60,7 +61,7 @@ int run(const Arguments& arguments) {
   const Timer total;
   const std::string& json = arguments.common.json;
   check_outputs({{"--json", json}}, with_survey({arguments.in}, arguments.constraints));
-  const InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  const InputFile input = read_input(arguments.in, arguments.common);
   std::vector<Finding> findings = check(input.problem);
   if (auto weak = weak_lenses(input.problem, arguments.common.threads))
     findings.push_back(*std::move(weak));

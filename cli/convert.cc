@@ -12,6 +12,7 @@
 #include "interrupt.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -67,7 +68,7 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out, true}, {"--json", json}},
                 {arguments.in, arguments.rigs.path});
-  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_input(arguments.in, arguments.common);
   const Json before = input_json(arguments.in, input);
   const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   const std::string counts = counts_text(input.problem);

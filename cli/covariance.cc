@@ -18,6 +18,7 @@
 #include "options/refinement.h"
 #include "outputs.h"
 #include "projection_option.h"
+#include "read_input.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -105,7 +106,7 @@ int run(const Arguments& arguments) {
                  {"--projection", arguments.projection.csv},
                  {"--projection-figure", arguments.projection.figure}},
                 with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
-  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_input(arguments.in, arguments.common);
   Problem& problem = input.problem;
   lay_rigs(arguments.rigs, input, arguments.common.quiet);
   CovarianceOptions options = arguments.covariance;

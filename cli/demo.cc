@@ -96,6 +96,7 @@ int run(const Arguments& arguments) {
   const PhotometricDemo photometric =
       run_photometric_demo(arguments.scene.seed, arguments.common.threads, interrupt.token());
   interrupt.begin_write();
+  progress.end();
 
   const StateErrors before = compare_states(scene.start, scene.truth, true).value();
   const StateErrors after = compare_states(problem, scene.truth, true).value();

@@ -11,6 +11,7 @@
 #include "json_document.h"
 #include "matching_document.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "report/errors.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -46,9 +47,8 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"--csv", arguments.csv}, {"--json", json}},
                 {arguments.estimate, arguments.reference});
-  const ReadOptions hash{.hash = !json.empty()};
-  const InputFile estimate = read_file(arguments.estimate, hash).value();
-  const InputFile reference = read_file(arguments.reference, hash).value();
+  const InputFile estimate = read_input(arguments.estimate, arguments.common);
+  const InputFile reference = read_input(arguments.reference, arguments.common);
   const AlignBy align_by = arguments.no_align ? AlignBy::nothing
                            : arguments.robust ? AlignBy::robust
                                               : AlignBy::least_squares;

@@ -15,6 +15,7 @@
 #include "json_document.h"
 #include "outputs.h"
 #include "platform/memory.h"
+#include "read_input.h"
 #include "rigs_option.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
@@ -237,7 +238,7 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"--pattern", arguments.pattern}, {"--json", json}},
                 {arguments.in, arguments.rigs.path});
-  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_input(arguments.in, arguments.common);
   const Json read = input_json(arguments.in, input);
   const Json laid = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   const Statistics statistics = statistics_of(input.problem);

@@ -4,10 +4,14 @@
 
 #include <poll.h>
 #include <signal.h>
+#include <sys/time.h>
+#include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <string_view>
 
 #include "exit_code.h"
@@ -34,10 +38,28 @@ void tell(std::string_view words) {
   if (::poll(&ready, 1, 0) == 1) (void)!::write(STDERR_FILENO, words.data(), words.size());
 }
 
-[[noreturn]] void leave() {
+[[noreturn]] void leave(int code = kExitInterrupted) {
   if (const int child = watch.child) ::kill(-child, SIGKILL);
   unlink_partial_files();
-  ::_exit(kExitInterrupted);
+  ::_exit(code);
+}
+
+/// Seconds that this process has run.
+double age_s() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  static const timespec kBegin = now;  // first asked for when signals are watched
+  return static_cast<double>(now.tv_sec - kBegin.tv_sec) +
+         1e-9 * static_cast<double>(now.tv_nsec - kBegin.tv_nsec);
+}
+
+extern "C" void take_alarm(int) {
+  const int error = errno;
+  if (watch.phase == Phase::read) {
+    if (!watch.quiet) tell("the time limit was reached before all was read: nothing is written\n");
+    leave(kExitTimeLimit);
+  }
+  errno = error;
 }
 
 extern "C" void take_signal(int) {
@@ -55,6 +77,7 @@ extern "C" void take_signal(int) {
 }  // namespace
 
 void watch_signals() {
+  (void)age_s();
   ::signal(SIGPIPE, SIG_IGN);
   ::signal(SIGXFSZ, SIG_IGN);
   struct sigaction action {};
@@ -84,6 +107,24 @@ Interrupt::~Interrupt() {
   watch.phase = Phase::over;
   watch.stop = nullptr;
 }
+
+void Interrupt::limit(double seconds) {
+  constexpr double kGrace = 0.5, kLongest = 1e8;
+  limit_s_ = seconds;
+  if (!(seconds < kLongest)) return;
+  struct sigaction action {};
+  action.sa_handler = take_alarm;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  ::sigaction(SIGALRM, &action, nullptr);
+  const double after = std::max(1e-3, seconds + kGrace - age_s());
+  itimerval timer{};
+  timer.it_value.tv_sec = static_cast<time_t>(after);
+  timer.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (after - std::floor(after)));
+  ::setitimer(ITIMER_REAL, &timer, nullptr);
+}
+
+double Interrupt::left_s() const { return std::max(1e-9, limit_s_ - age_s()); }
 
 void Interrupt::begin_solve() { watch.phase = Phase::solve; }
 void Interrupt::begin_write() { watch.phase = Phase::write; }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
+
 #include "sheaf/stop.h"
 
 namespace sheaf {
@@ -27,12 +29,19 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
+  /// A run of this verb is to end after so many seconds from the command's beginning: where it
+  /// still reads half a second later, nothing can be saved, and it ends with kExitTimeLimit.
+  void limit(double seconds);
+  /// Of that time; infinite without a limit, and never 0: there is always a start to write.
+  double left_s() const;
+
   void begin_solve();
   void begin_write();
   StopToken token() const { return stop_.get_token(); }
 
  private:
   StopSource stop_;
+  double limit_s_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace sheaf

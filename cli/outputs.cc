@@ -122,7 +122,8 @@ void check_holds_refined(const Problem& problem, const Fixed& fixed, const std::
 std::uint64_t bytes_at(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return fs::file_size(path, ignored);
+  if (!fs::is_directory(path, ignored))
+    return fs::is_regular_file(path, ignored) ? fs::file_size(path, ignored) : 0;
   std::uint64_t bytes = 0;
   for (const auto& entry : fs::directory_iterator(path, ignored))
     if (entry.is_regular_file(ignored)) bytes += entry.file_size(ignored);

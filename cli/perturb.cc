@@ -11,6 +11,7 @@
 #include "noise_document.h"
 #include "options/noise_options.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "terminal.h"
@@ -80,7 +81,7 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"OUT", arguments.out, true}, {"--json", json}}, {arguments.in});
   const NoiseOptions& noise = arguments.noise;
-  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_input(arguments.in, arguments.common);
   const Json before = input_json(arguments.in, input);
   Effect effect;
   effect.before = evaluate(input.problem);

@@ -16,9 +16,12 @@
 #include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
+#include "live_line.h"
 #include "options/solve_options.h"
 #include "outputs.h"
+#include "platform/transfers.h"
 #include "progress.h"
+#include "read_input.h"
 #include "rigs_option.h"
 #include "scene/subset.h"
 #include "sheaf/sheaf.h"
@@ -70,7 +73,11 @@ struct SigmasWork {
   std::optional<Covariance> found;
   std::optional<Error> failed;
 
+  /// Of a run that was cut short nothing more is computed.
   void run(const Problem& problem, const SolveOptions& solved, const Summary& summary) {
+    if (summary.termination == Termination::stopped ||
+        summary.termination == Termination::time_limit)
+      return;
     options.fixed = solved.fixed;
     options.threads = solved.threads;
     if (solved.loss.kind != LossKind::none)
@@ -103,6 +110,7 @@ void finish(SurveyWork& work, Problem& problem, Summary& summary) {
 // The best state found, and what was written.
 std::vector<std::string> write_results(const Arguments& arguments, const SurveyWork& work,
                                        Problem before, const Problem& after) {
+  const Activity writing(arguments.common.quiet, "writing", &transfers.written);
   std::vector<std::string> written;
   if (!arguments.out.empty()) {
     write(after, arguments.out).value();
@@ -147,6 +155,14 @@ bool agrees(const Summary& summary, const Evaluation& after, const Problem& prob
   return std::abs(cost - summary.final_plain_cost) <= kRounding * (cost + 1e-20);
 }
 
+Progress progress_of(const Arguments& arguments, const Interrupt& interrupt,
+                     const Problem& problem) {
+  const SolveOptions& asked = arguments.solve.options;
+  return Progress(arguments.common.quiet,
+                  {asked.max_iterations, asked.tolerance, interrupt.left_s()},
+                  problem.num_observations());
+}
+
 SolveOptions options_for(const Arguments& arguments, const Interrupt& interrupt, Progress& progress,
                          StepLog& log) {
   SolveOptions options = arguments.solve.options;
@@ -174,7 +190,10 @@ void say(const Arguments& arguments, const InputFile& input, const SolveRecord& 
               summary.threads);
   print_text(summary_text(summary, input.read_s));
   print_text(residuals_text(work.report));
-  if (sigmas.found) print_text(covariance_text(input.problem, {}, *sigmas.found));
+  if (sigmas.found)
+    print_text(covariance_text(input.problem, {}, *sigmas.found));
+  else if (!arguments.sigmas.empty() && !sigmas.failed && summary.usable())
+    print_out("note        no sigmas: the run was cut short\n");
   print_text(held);
   if (!record.agrees)
     print_out("wrong       independent code has the plain cost {:.9e} for this state, not {:.9e}\n",
@@ -201,7 +220,8 @@ int run(Arguments& arguments) {
   Interrupt interrupt(arguments.common.quiet);
   const bool wants_json = !arguments.common.json.empty();
   check_outputs(outputs_of(arguments), inputs_of(arguments));
-  InputFile input = read_file(arguments.in, {.hash = wants_json}).value();
+  interrupt.limit(arguments.solve.options.time_limit_s);
+  InputFile input = read_input(arguments.in, arguments.common);
   Problem& problem = input.problem;
   check_holds(problem, arguments.out);
 
@@ -212,7 +232,7 @@ int run(Arguments& arguments) {
   record.rig_configuration = lay_rigs(arguments.rigs, input, arguments.common.quiet);
   if (wants_json) record.before = evaluate(problem);
 
-  Progress progress(arguments.common.quiet);
+  Progress progress = progress_of(arguments, interrupt, problem);
   StepLog log(arguments.log);
   SolveOptions options = options_for(arguments, interrupt, progress, log);
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
@@ -220,10 +240,13 @@ int run(Arguments& arguments) {
   SurveyWork work{place_survey(arguments.constraints, problem, options.fixed)};
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
   interrupt.begin_solve();
+  progress.begin();
+  options.time_limit_s = interrupt.left_s();
   const double cpu_before_s = processor_seconds();
   Summary summary = try_solve(problem, options).value();
   record.cpu_s = processor_seconds() - cpu_before_s;
   interrupt.begin_write();
+  progress.end();
 
   const Timer writing;
   record.after = evaluate(problem);

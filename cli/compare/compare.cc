@@ -19,6 +19,7 @@
 #include "json_document.h"
 #include "outputs.h"
 #include "program.h"
+#include "read_input.h"
 #include "report/comparison.h"
 #include "scene/camera_frame.h"
 #include "sheaf/sheaf.h"
@@ -141,7 +142,7 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"--plot", arguments.plot}, {"--json", json}},
                 {arguments.in, arguments.reference});
-  InputFile input = read_file(arguments.in, {.hash = !json.empty()}).value();
+  InputFile input = read_input(arguments.in, arguments.common);
   const Json input_document = input_json(arguments.in, input);
   make_bal(input, arguments.own_lenses, arguments.common.quiet);
   Problem reference;

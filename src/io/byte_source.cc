@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "io/sha256.h"
+#include "platform/transfers.h"
 #include "platform/unicode.h"
 
 namespace sheaf {
@@ -98,6 +99,7 @@ Result<std::size_t> RawBytes::read(char* to, std::size_t capacity) {
     done += static_cast<std::size_t>(n);
   }
   bytes_read_ += done;
+  transfers.read.fetch_add(done, std::memory_order_relaxed);
   if (hash_ != nullptr) hash_->update(to, done);
   return done;
 }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "io/partial.h"
+#include "platform/transfers.h"
 
 namespace sheaf {
 namespace {
@@ -191,6 +192,7 @@ void OutputFile::write_raw(const char* data, std::size_t size) {
     const ssize_t n = ::write(fd_, data, size);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return fail(errno);
+    transfers.written.fetch_add(static_cast<std::uint64_t>(n), std::memory_order_relaxed);
     data += n, size -= static_cast<std::size_t>(n);
   }
 }
