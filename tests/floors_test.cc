@@ -165,7 +165,9 @@ TEST(Floors, QuotedIncludesAreOurs) {
 
 TEST(Floors, PublicHeadersShowOnlyTheStandardLibrary) {
   const auto headers = read_sources({"include"}, {".h"});
-  EXPECT_LE(headers.size(), 16u);
+  // The last one is solver.h: what stays between solves and what slides are called by programs of
+  // another kind than those that solve a file once.
+  EXPECT_LE(headers.size(), 17u);
   for (const SourceFile& file : headers) {
     for (const Include& include : includes_of(file)) {
       const bool standard =

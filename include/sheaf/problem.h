@@ -91,7 +91,7 @@ struct Problem {
   std::vector<std::uint32_t> observation_point;
   std::vector<double> observation_xy;  ///< 2 x observations, pixels
   /// Pixels, one for each observation, above 0: residuals are divided by it, so that losses' scales
-  /// and costs count in sigmas. Empty: 1 pixel each.
+  /// and costs count in sigmas. Infinite: it takes no part. Empty: 1 pixel each.
   std::vector<double> observation_sigma;
   Rigs rigs;    ///< which images move as one
   Terms terms;  ///< what is known beside the observations

@@ -13,5 +13,6 @@
 #include "sheaf/problem.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"
+#include "sheaf/solver.h"
 #include "sheaf/stop.h"
 #include "sheaf/survey.h"

@@ -23,6 +23,7 @@ void bind_pickling(ProblemClass& problem);
 void bind_terms(ProblemClass& problem);
 void bind_files(nb::module_& module, ProblemClass& problem);
 void bind_solve(nb::module_& module);
+void bind_solver(nb::module_& module);
 void bind_scenes(nb::module_& module);
 void bind_reports(nb::module_& module);
 void bind_covariance(nb::module_& module);

@@ -71,6 +71,7 @@ NB_MODULE(_sheaf, module) {
   sheaf::bind_terms(problem);
   sheaf::bind_files(module, problem);
   sheaf::bind_solve(module);
+  sheaf::bind_solver(module);
   sheaf::bind_scenes(module);
   sheaf::bind_reports(module);
   sheaf::bind_covariance(module);

@@ -76,7 +76,7 @@ class Construction(unittest.TestCase):
             ({"cameras": [("PINHOLE", [1, 2, 3])]}, "found 3 parameters, expected the 4 of PINHOLE"),
             ({"cameras": [("FISH", [1.0])]}, "found the model 'FISH', expected one of BAL"),
             ({"names": ["a"]}, "names: found 1 for 8 images"),
-            ({"observation_sigma": numpy.zeros(len(first))}, "sigma is not a finite number above"),
+            ({"observation_sigma": numpy.zeros(len(first))}, "sigma is not a number above"),
             ({"rigs": {}}, "rigs: sensor_from_rig is missing"),
         ]:
             with self.subTest(words), self.assertRaisesRegex(sheaf.Error, words) as caught:

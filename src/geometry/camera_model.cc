@@ -67,17 +67,19 @@ std::optional<CameraModel> camera_model_of_colmap(int id) {
 }
 
 ParameterRoles roles_of(CameraModel model) {
-  ParameterRoles roles;
-  const std::vector<std::string_view> names = parameter_names(model);
-  for (int i = 0; i < static_cast<int>(names.size()); ++i) {
-    const std::string_view name = names[static_cast<std::size_t>(i)];
-    if (name == "fy") roles.fy = i;
-    if (name == "cx") roles.cx = i;
-    if (name == "cy") roles.cy = i;
-    if (name == "k1" || name == "k") roles.k1 = i;
-    if (name == "k2") roles.k2 = i;
-  }
-  return roles;
+  return with_lens(model, [](auto lens) {
+    ParameterRoles roles;
+    const auto& names = decltype(lens)::kParameters;
+    for (int i = 0; i < static_cast<int>(names.size()); ++i) {
+      const std::string_view name = names[static_cast<std::size_t>(i)];
+      if (name == "fy") roles.fy = i;
+      if (name == "cx") roles.cx = i;
+      if (name == "cy") roles.cy = i;
+      if (name == "k1" || name == "k") roles.k1 = i;
+      if (name == "k2") roles.k2 = i;
+    }
+    return roles;
+  });
 }
 
 }  // namespace sheaf

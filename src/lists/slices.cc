@@ -22,7 +22,13 @@ int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
   constexpr double kFlopsPerSlice = 15e6, kBytes = 96e6;
   const double sums = 8.0 * (kTileDoubles * static_cast<double>(tiles) +
                              kDiagonalDoubles * static_cast<double>(images));
-  return std::max(1, static_cast<int>(std::min({32.0, flops / kFlopsPerSlice, kBytes / sums})));
+  // Sums that stay in the second-level cache cost next to nothing: small scenes have slices too, so
+  // that several threads are of use to them.
+  constexpr double kFewFlops = 3e6, kCheapBytes = 128e3, kMostFew = 8;
+  const double few = sums < kCheapBytes ? std::min(kMostFew, flops / kFewFlops) : 0;
+  return std::max(
+      1, static_cast<int>(std::min(
+             {double(kMostSlices), std::max(few, flops / kFlopsPerSlice), kBytes / sums})));
 }
 
 }  // namespace sheaf

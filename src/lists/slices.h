@@ -14,6 +14,8 @@ namespace sheaf {
 /// order.
 void add_slices(Buffer<double>& sums, std::size_t slices, Threads& threads);
 
+constexpr std::size_t kMostSlices = 32;
+
 /// Slices whose sums are kept apart: about equal work, few enough that their sums cost little.
 /// flops: of one linearisation, by linearize_flops (lists/block_layout.h).
 int count_slices(double flops, std::uint64_t tiles, std::uint64_t images);

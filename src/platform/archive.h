@@ -135,4 +135,49 @@ class ArchiveReader {
   bool ok_ = true;
 };
 
+/// Whether fields are those that a writer wrote: told without allocating anything.
+class ArchiveComparison {
+ public:
+  explicit ArchiveComparison(std::string_view bytes) : bytes_(bytes) {}
+
+  template <class... Fields>
+  void operator()(const Fields&... fields) {
+    (compare(fields), ...);
+  }
+  /// Whether all fields were the same and nothing is left.
+  bool same() const { return same_ && bytes_.empty(); }
+
+ private:
+  template <class T>
+  void compare(const T& value) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>)
+      compare_bytes(&value, sizeof value);
+    else if (same_)
+      archive(*this, const_cast<T&>(value));
+  }
+  template <class T, std::size_t kCount>
+  void compare(const std::array<T, kCount>& values) {
+    for (const T& value : values) compare(value);
+  }
+  template <class T>
+  void compare(const std::vector<T>& values) {
+    compare(static_cast<std::uint64_t>(values.size()));
+    if constexpr (std::is_arithmetic_v<T>)
+      compare_bytes(values.data(), values.size() * sizeof(T));
+    else
+      for (const T& value : values) compare(value);
+  }
+  void compare_bytes(const void* bytes, std::size_t size) {
+    if (!same_ || bytes_.size() < size) {
+      same_ = false;
+      return;
+    }
+    same_ = size == 0 || std::memcmp(bytes_.data(), bytes, size) == 0;
+    bytes_.remove_prefix(size);
+  }
+
+  std::string_view bytes_;
+  bool same_ = true;
+};
+
 }  // namespace sheaf

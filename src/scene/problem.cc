@@ -120,8 +120,8 @@ Result<void> validate_observations(const Problem& p) {
       return invalid(numbered("observation", i) + ": the pixel is not finite");
   }
   for (std::size_t i = 0; i < p.observation_sigma.size(); ++i)
-    if (!(p.observation_sigma[i] > 0) || !std::isfinite(p.observation_sigma[i]))
-      return invalid(numbered("observation", i) + ": the sigma is not a finite number above 0");
+    if (!(p.observation_sigma[i] > 0))
+      return invalid(numbered("observation", i) + ": the sigma is not a number above 0");
   return {};
 }
 
@@ -194,6 +194,8 @@ Evaluation evaluate(const Problem& problem) {
   CompensatedSum sum, weighted;
   std::size_t finite = 0;
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    const double sigma = problem.observation_sigma.empty() ? 1 : problem.observation_sigma[i];
+    if (std::isinf(sigma)) continue;  // switched off
     const std::uint32_t image = problem.observation_image[i];
     const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];
     const auto& t = poses[image].translation;
@@ -209,7 +211,6 @@ Evaluation evaluate(const Problem& problem) {
       continue;
     }
     sum.add(square);
-    const double sigma = problem.observation_sigma.empty() ? 1 : problem.observation_sigma[i];
     weighted.add(square / (sigma * sigma));
     ++finite;
   }

@@ -6,49 +6,15 @@
 #include <cstddef>
 #include <memory>
 
+#include "scene/renumber.h"
+
 namespace sheaf {
 namespace {
-
-/// Entries of `width` numbers each.
-template <class List, class IsKept>
-void shorten(List& list, std::size_t width, const IsKept& is_kept) {
-  std::size_t to = 0;
-  for (std::size_t i = 0; i < list.size(); ++i)
-    if (is_kept(i / width)) list[to++] = list[i];
-  list.resize(to);
-}
 
 /// Counts of observations become the numbers of the points that have enough of them.
 void number_points(std::vector<std::uint32_t>& counts, std::uint32_t least_track) {
   std::uint32_t next = 0;
   for (std::uint32_t& count : counts) count = count < least_track ? kGonePoint : next++;
-}
-
-using PriorBlock = GaussianPrior::Block;
-
-/// Terms name the points that are left; those on a point that is gone go too.
-void renumber(Terms& terms, const std::vector<std::uint32_t>& numbers) {
-  const auto gone = [&](std::uint32_t point) { return numbers[point] == kGonePoint; };
-  const auto names_gone = [&](const GaussianPrior& prior) {
-    return std::any_of(prior.blocks.begin(), prior.blocks.end(), [&](const PriorBlock& block) {
-      return block.kind == PriorBlock::Kind::point && gone(block.index);
-    });
-  };
-  std::erase_if(terms.points, [&](const PointPrior& prior) { return gone(prior.point); });
-  std::erase_if(terms.distances, [&](const DistancePrior& prior) {
-    return gone(prior.first) || gone(prior.second);
-  });
-  std::erase_if(terms.gaussians, names_gone);
-  std::erase_if(terms.kept_points, gone);
-  for (PointPrior& prior : terms.points) prior.point = numbers[prior.point];
-  for (DistancePrior& prior : terms.distances) {
-    prior.first = numbers[prior.first];
-    prior.second = numbers[prior.second];
-  }
-  for (GaussianPrior& prior : terms.gaussians)
-    for (PriorBlock& block : prior.blocks)
-      if (block.kind == PriorBlock::Kind::point) block.index = numbers[block.index];
-  for (std::uint32_t& point : terms.kept_points) point = numbers[point];
 }
 
 }  // namespace
@@ -70,7 +36,7 @@ std::vector<std::uint32_t> keep_observations(Problem& problem, std::vector<bool>
   for (std::uint32_t& p : problem.observation_point) p = numbers[p];
   shorten(problem.observation_xy, 2, observation);
   shorten(problem.observation_sigma, 1, observation);
-  renumber(problem.terms, numbers);
+  renumber({{}, {}, numbers}, problem.terms);
   if (problem.metadata == nullptr) return numbers;
   auto metadata = std::make_shared<SceneMetadata>(*problem.metadata);
   shorten(metadata->point_ids, 1, point);

@@ -142,8 +142,6 @@ class Rounds {
 
   /// Steps with the round's scale until they gain less than the tolerance.
   void descend(double tolerance) {
-    SolveOptions options = options_;
-    options.tolerance = tolerance;
     std::size_t before = summary_.iterations.size();
     if (hooks_ != nullptr && hooks_->progress != nullptr) {
       RunProgress& progress = *hooks_->progress;
@@ -151,8 +149,9 @@ class Rounds {
       progress.round_begin = before;
       progress.provisional = provisional_;
     }
-    restarts_ = minimize(system_, {options_.loss.kind, now().scale_px}, options, since_start_,
-                         summary_, std::numeric_limits<double>::infinity(), history_, hooks_);
+    restarts_ =
+        minimize(system_, {options_.loss.kind, now().scale_px}, options_, since_start_, summary_,
+                 std::numeric_limits<double>::infinity(), history_, hooks_, tolerance);
     const std::size_t after = summary_.iterations.size();
     if (now().steps == 0)
       now().initial_cost =

@@ -3,12 +3,12 @@
 #include "solve/trust_region.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "platform/cancel.h"
 #include "solve/step_control.h"
@@ -42,11 +42,12 @@ constexpr double kRounding = 1e-14;
 
 class Loop {
  public:
-  Loop(System& system, const ScaledLoss& loss, const SolveOptions& options, const Stopwatch& clock,
-       Summary& summary, double settled_motion_px)
+  Loop(System& system, const ScaledLoss& loss, const SolveOptions& options, double tolerance,
+       const Stopwatch& clock, Summary& summary, double settled_motion_px)
       : system_(system),
         loss_(loss),
         options_(options),
+        tolerance_(tolerance),
         since_start_(clock),
         summary_(summary),
         settled_motion_px_(settled_motion_px),
@@ -63,7 +64,7 @@ class Loop {
     rejected_in_a_row_ = from.rejected_in_a_row;
     any_finite_trial_ = from.any_finite_trial;
     attempt_begin_ = from.attempt_begin;
-    last_iterations_ = from.last_iterations;
+    for (const int iterations : from.last_iterations) note_iterations(iterations);
   }
 
   /// Goes on from what is there, and leaves what there is after each step.
@@ -124,7 +125,7 @@ class Loop {
     to.rejected_in_a_row = rejected_in_a_row_;
     to.any_finite_trial = any_finite_trial_;
     to.attempt_begin = attempt_begin_;
-    to.last_iterations = last_iterations_;
+    to.last_iterations.assign(last_iterations_.begin(), last_iterations_.begin() + noted_);
     if (hooks_->before_step) hooks_->before_step();
   }
 
@@ -194,10 +195,10 @@ class Loop {
     forcing_ = std::clamp(std::sqrt(decrease), kTightestForcing, kLoosestForcing);
     precise_ = precise_ || decrease < kPreciseBelow;
     note_iterations(it.linear_iterations);
-    const bool small = decrease < options_.tolerance && trial.motion_px <= settled_motion_px_;
+    const bool small = decrease < tolerance_ && trial.motion_px <= settled_motion_px_;
     small_decreases_ = small ? small_decreases_ + 1 : 0;
     publish(it);
-    if (small_decreases_ >= (std::isinf(options_.tolerance) ? 1 : 2))
+    if (small_decreases_ >= (std::isinf(tolerance_) ? 1 : 2))
       end(Termination::cost_converged,
           "converged: the cost fell by less than the tolerance, relatively, twice in a row");
     if (!done_ && hooks_ != nullptr && recent_iterations_ > 0 &&
@@ -207,11 +208,14 @@ class Loop {
 
   /// The mean of the last kRecent steps, once there are so many.
   void note_iterations(int iterations) {
-    last_iterations_.push_back(iterations);
-    if (last_iterations_.size() > kRecent) last_iterations_.erase(last_iterations_.begin());
+    if (noted_ == kRecent)
+      std::copy(last_iterations_.begin() + 1, last_iterations_.end(), last_iterations_.begin());
+    else
+      ++noted_;
+    last_iterations_[noted_ - 1] = iterations;
     int sum = 0;
-    for (int count : last_iterations_) sum += count;
-    recent_iterations_ = last_iterations_.size() < kRecent ? 0 : static_cast<double>(sum) / kRecent;
+    for (std::size_t k = 0; k < noted_; ++k) sum += last_iterations_[k];
+    recent_iterations_ = noted_ < kRecent ? 0 : static_cast<double>(sum) / kRecent;
   }
 
   /// Where a loss that forgets is concave the model lies too high however low its floor, and the
@@ -308,8 +312,10 @@ class Loop {
 
   bool out_of_iterations() {
     if (steps_of(summary_) < options_.max_iterations) return false;
-    end(Termination::max_iterations,
-        "stopped after " + std::to_string(options_.max_iterations) + " iterations, as asked");
+    std::array<char, 64> words{};
+    std::snprintf(words.data(), words.size(), "stopped after %d iterations, as asked",
+                  options_.max_iterations);
+    end(Termination::max_iterations, words.data());
     return true;
   }
 
@@ -340,7 +346,7 @@ class Loop {
       end(Termination::stopped, "stopped by the caller; the best state so far is kept");
   }
 
-  void end(Termination termination, const std::string& words) {
+  void end(Termination termination, const char* words) {
     if (done_) return;
     done_ = true;
     summary_.termination = termination;
@@ -350,6 +356,7 @@ class Loop {
   System& system_;
   ScaledLoss loss_;
   const SolveOptions& options_;
+  const double tolerance_;
   const Stopwatch& since_start_;
   Summary& summary_;
   const double settled_motion_px_;
@@ -367,7 +374,8 @@ class Loop {
   bool begun_ = false, done_ = false;
   const Hooks* hooks_ = nullptr;
   bool restarts_ = false;
-  std::vector<int> last_iterations_;
+  std::array<int, kRecent> last_iterations_{};  ///< the first noted_ of them
+  std::size_t noted_ = 0;
   double recent_iterations_ = 0;
   std::size_t attempt_begin_ = 0;  ///< index of the iteration that this attempt started from
 };
@@ -388,8 +396,10 @@ int steps_of(const Summary& summary) {
 
 bool minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
               const Stopwatch& since_start, Summary& summary, double settled_motion_px,
-              std::optional<LoopHistory>* history, const Hooks* hooks) {
-  Loop loop(system, loss, options, since_start, summary, settled_motion_px);
+              std::optional<LoopHistory>* history, const Hooks* hooks,
+              std::optional<double> tolerance) {
+  Loop loop(system, loss, options, tolerance.value_or(options.tolerance), since_start, summary,
+            settled_motion_px);
   loop.keep(history);
   loop.may_ask(hooks);
   loop.run();

@@ -86,11 +86,13 @@ struct Hooks {
 /// steps are those of a run that was never stopped.
 /// `hooks` are asked where an early step went wrong, and after steps of many conjugate gradients;
 /// where they want another state or another solver, the loop ends and returns true, with no reason
-/// for stopping set.
+/// for stopping set. `tolerance`: in place of the options' own.
+/// Allocates nothing but what the summary has no room for.
 bool minimize(System& system, const ScaledLoss& loss, const SolveOptions& options,
               const Stopwatch& since_start, Summary& summary,
               double settled_motion_px = std::numeric_limits<double>::infinity(),
-              std::optional<LoopHistory>* history = nullptr, const Hooks* hooks = nullptr);
+              std::optional<LoopHistory>* history = nullptr, const Hooks* hooks = nullptr,
+              std::optional<double> tolerance = {});
 
 /// What counts as an iteration: steps, rejected ones included, and passes of recoveries.
 int steps_of(const Summary& summary);

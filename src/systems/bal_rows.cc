@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "systems/residual_quantile.h"
+#include "lists/slices.h"
 
 namespace sheaf {
 
@@ -88,15 +88,23 @@ void BalRows::trial(const PointTrial& of, std::uint32_t chunk, TrialOutput& out)
 }
 
 double BalRows::residual_scale(double quantile) const {
-  return residual_quantile(
-      batches_, chunks_, quantile, threads_, [&](const Chunk& chunk, double* out) {
+  return residual_quantile(batches_, chunks_, quantile, threads_, residual_scratch_,
+                           [&](const Chunk& chunk, double* out) {
+                             kernels_.residuals(batches_, held_.data(), state_->held.points.data(),
+                                                chunk, out);
+                           });
+}
+
+double BalRows::pixel_rms() const {
+  return sheaf::pixel_rms(
+      batches_, chunks_, threads_, residual_scratch_, [&](const Chunk& chunk, double* out) {
         kernels_.residuals(batches_, held_.data(), state_->held.points.data(), chunk, out);
       });
 }
 
 std::uint64_t BalRows::count_behind() const {
-  std::vector<std::uint64_t> counts(chunks_.slices.size() - 1, 0);
-  threads_.for_each(counts.size(), [&](std::size_t s) {
+  std::array<std::uint64_t, kMostSlices> counts{};
+  threads_.for_each(chunks_.slices.size() - 1, [&](std::size_t s) {
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
       counts[s] += kernels_.count_behind(batches_, held_.data(), state_->held.points.data(),
                                          chunks_.chunks[c]);

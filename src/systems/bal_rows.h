@@ -9,6 +9,7 @@
 #include "systems/arrangement.h"
 #include "systems/bal_operators.h"
 #include "systems/point_rows.h"
+#include "systems/residual_quantile.h"
 
 namespace sheaf {
 
@@ -31,6 +32,7 @@ class BalRows : public PointRows {
   void trial(const PointTrial& in, std::uint32_t chunk, TrialOutput& out) override;
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
+  double pixel_rms() const override;
   std::uint64_t count_behind() const override;
   Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override {
@@ -50,6 +52,7 @@ class BalRows : public PointRows {
   Threads& threads_;
   const SteppedState* state_ = nullptr;
   Buffer<double> held_, tried_;  ///< kCameraRecord per image
+  mutable ResidualScratch residual_scratch_;
 };
 
 }  // namespace sheaf

@@ -61,8 +61,12 @@ bool BalView::turns(const Problem& problem, std::size_t image) const {
   return problem.cameras[problem.image_camera[image]].model != CameraModel::bal;
 }
 
-CameraState BalView::cameras(const Problem& problem) const {
-  CameraState out;
+void BalView::renew(const Problem& problem) {
+  for (std::size_t c = 0; c < views_.size(); ++c) views_[c] = *radial_view(problem.cameras[c]);
+}
+
+void BalView::cameras(const Problem& problem, CameraState& out) const {
+  clear(out);
   out.poses.reserve(problem.num_images());
   for (std::size_t i = 0; i < problem.num_images(); ++i) {
     Pose pose = problem.poses[i];
@@ -77,7 +81,6 @@ CameraState BalView::cameras(const Problem& problem) const {
   for (const Pose& pose : problem.rigs.rig_from_world)
     out.frames.push_back({pose.rotation, pose.translation});
   for (const RadialView& view : views_) out.sets.push_back({view.f, view.k1, view.k2});
-  return out;
 }
 
 std::array<double, 2> BalView::turned(const Problem& problem, std::size_t image,

@@ -24,12 +24,14 @@ class BalView {
   /// The problem must be one that it serves.
   BalView(const Problem& problem, const Fixed& fixed);
 
+  /// Takes the parameters of another problem of the same models; the same are held.
+  void renew(const Problem& problem);
   /// Whether any camera is of another model, so that measurements differ from the problem's.
   bool turns() const { return turns_; }
   /// What is held of each camera's f, k1 and k2: what its model does not have too.
   const std::vector<ParameterSet>& held() const { return held_; }
   /// The poses turned, and f, k1, k2 of each camera.
-  CameraState cameras(const Problem& problem) const;
+  void cameras(const Problem& problem, CameraState& out) const;
   /// Measurements as they were arranged, from the problem's to the view's.
   void turn(const Problem& problem, Batches& batches, Threads& threads) const;
   void turn(const Problem& problem, ImageBatches& batches, Threads& threads) const;

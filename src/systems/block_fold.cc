@@ -81,14 +81,19 @@ void add_vectors(const BlockPart& part, const Adjoints& adjoints, const double* 
 
 }  // namespace
 
-Adjoints adjoints_of(const CameraState& cameras) {
-  Adjoints out;
+void adjoints_of(const CameraState& cameras, Adjoints& out) {
+  out.clear();
   for (const RigidMotion<double>& sensor : cameras.sensors) {
     const std::array<double, 36> A = adjoint_of(sensor);
     Adjoint& to = out.emplace_back();
     for (std::size_t r = 0; r < kPose; ++r)
       std::copy_n(&A[kPose * r], kPose, &to.at[Adjoint::kStride * r]);
   }
+}
+
+Adjoints adjoints_of(const CameraState& cameras) {
+  Adjoints out;
+  adjoints_of(cameras, out);
   return out;
 }
 

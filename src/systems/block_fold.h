@@ -25,6 +25,8 @@ struct alignas(64) Adjoint {
 };
 using Adjoints = std::vector<Adjoint>;
 Adjoints adjoints_of(const CameraState& cameras);
+/// Allocates nothing where `out` had as many.
+void adjoints_of(const CameraState& cameras, Adjoints& out);
 
 /// kBlockVector doubles for each block of rows from those of the solved blocks, x_row = M x.
 void to_rows(const BlockMap& map, const Adjoints& adjoints, const double* solved, double* rows);

@@ -112,7 +112,7 @@ Result<const Kernels*> choose_kernels(Simd simd) {
 }
 
 Build::Build(const SolveOptions& options, const Kernels& kernels, Threads& threads)
-    : options_(options), kernels_(&kernels), threads_(&threads) {}
+    : options_(options), asked_points_(options.points), kernels_(&kernels), threads_(&threads) {}
 
 Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
@@ -120,6 +120,7 @@ Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
   Build build(options, kernels, threads);
   build.points_ = choose_points(problem, skip, options);
   build.options_.points = build.points_.points;
+  build.skips_ = !skip.empty();
   build.kept_ = kept_points(problem.terms);
   if (BalView::serves(problem, options.fixed) && !restates_terms(problem))
     build.view_.emplace(problem, options.fixed);
@@ -208,17 +209,20 @@ void Build::map_blocks_of(const Problem& problem, const std::vector<std::uint8_t
   to.map->term_tiles = tiles_of(terms_);
 }
 
-CameraState Build::cameras(const Problem& problem) const {
-  CameraState out = view_ ? view_->cameras(problem) : camera_state(problem);
+void Build::cameras(const Problem& problem, CameraState& out) const {
+  if (view_)
+    view_->cameras(problem, out);
+  else
+    camera_state(problem, out);
   for (const std::uint32_t point : kept_) {
     const double* X = &problem.points[3 * std::size_t(point)];
     out.kept.push_back({X[0], X[1], X[2]});
   }
-  return out;
 }
 
 bool Build::fits(const CameraState& held, const Problem& problem) const {
-  const CameraState own = cameras(problem);
+  CameraState own;
+  cameras(problem, own);
   return held.poses.size() == own.poses.size() && held.sets.size() == own.sets.size() &&
          held.sensors.size() == own.sensors.size() && held.frames.size() == own.frames.size() &&
          held.kept.size() == own.kept.size();
@@ -226,7 +230,11 @@ bool Build::fits(const CameraState& held, const Problem& problem) const {
 
 std::unique_ptr<Home> Build::make_home(const Problem& problem, const CameraState* held) {
   const Kernels& kernels = *kernels_;
-  CameraState start = held != nullptr ? *held : cameras(problem);
+  CameraState start;
+  if (held != nullptr)
+    start = *held;
+  else
+    cameras(problem, start);
   if (by_image_)
     return std::make_unique<ImageSystem>(std::move(start), problem.image_camera,
                                          std::move(*by_image_), arranged_->columns,
@@ -273,6 +281,31 @@ void Build::store(const Home& home, Problem& problem) const {
               &problem.points[3 * std::size_t(kept_[j])]);
   follow_images(problem);
   place_images(problem);
+}
+
+void Build::stay(const Problem& problem) {
+  constexpr std::size_t kWords = 128;
+  for (PointChoice* choice : {&points_, &new_points_}) choice->reason.reserve(kWords);
+  refill_ = Refill(problem, {}, arranged_->batches, *threads_);
+  cameras(problem, start_);
+  options_.points = asked_points_;
+  choose_points(problem, {}, options_, parallax_, new_points_);
+  options_.points = points_.points;
+}
+
+bool Build::restart(const Problem& problem, Home& home) {
+  options_.points = asked_points_;
+  choose_points(problem, {}, options_, parallax_, new_points_);
+  options_.points = points_.points;
+  if (new_points_.points != points_.points || new_points_.crosses != points_.crosses) return false;
+  points_.reason = new_points_.reason;
+  refill_.fill(problem, *threads_, arranged_->batches);
+  if (view_) {
+    view_->renew(problem);
+    view_->turn(problem, arranged_->batches, *threads_);
+  }
+  cameras(problem, start_);
+  return home.restart(start_, problem.points);
 }
 
 }  // namespace sheaf

@@ -10,6 +10,7 @@
 #include "eliminate/kernels.h"
 #include "lists/image_batches.h"
 #include "lists/lent_observations.h"
+#include "lists/refill.h"
 #include "platform/parallel.h"
 #include "sheaf/options.h"
 #include "systems/arrangement.h"
@@ -48,6 +49,16 @@ class Build {
   /// Writes the home's held state into the problem.
   void store(const Home& home, Problem& problem) const;
 
+  /// Whether restart() may be called once stay() was: not where observations are left out or lent,
+  /// nor with kept points or images alone, which hold measurements of their own.
+  bool can_stay() const { return !skips_ && !lends_ && !by_image_ && kept_.empty(); }
+  /// Remembers where the problem's observations stand. Throws std::bad_alloc.
+  void stay(const Problem& problem);
+  /// Begins again with a problem of the same structure that differs in its state, measurements and
+  /// sigmas alone, as a home of a new plan would; allocates nothing. False where the plan would be
+  /// another one or the home does not know how: both are then to be made anew.
+  bool restart(const Problem& problem, Home& home);
+
  private:
   Build(const SolveOptions& options, const Kernels& kernels, Threads& threads);
   Result<void> plan_bal(const Problem& problem, const std::vector<std::uint8_t>& skip);
@@ -58,10 +69,11 @@ class Build {
   Result<void> plan_lenses(const Problem& problem, const std::vector<std::uint8_t>& skip);
   /// Where blocks of rows are not what is solved for: rigs, terms.
   void map_blocks_of(const Problem& problem, const std::vector<std::uint8_t>& skip);
-  CameraState cameras(const Problem& problem) const;
+  void cameras(const Problem& problem, CameraState& out) const;
   bool watches_behind() const { return options_.cheirality != Cheirality::formula; }
 
   SolveOptions options_;  ///< with the points' coordinates chosen
+  const PointParametrisation asked_points_;
   PointChoice points_;
   const Kernels* kernels_;
   Threads* threads_;
@@ -72,6 +84,13 @@ class Build {
   bool lends_ = false;
   std::vector<std::uint32_t> kept_;  ///< points that are not eliminated
   std::vector<std::unique_ptr<Term>> terms_;
+  bool skips_ = false;  ///< observations are left out
+
+  // Of a home that stays.
+  Refill refill_;
+  CameraState start_;
+  ParallaxScratch parallax_;
+  PointChoice new_points_;
 };
 
 /// The kernels of an instruction set. Errors: usage, this machine cannot run it.

@@ -22,8 +22,13 @@ double bounded(double value, double change, double lower, double upper) {
 
 }  // namespace
 
-CameraState camera_state(const Problem& problem) {
-  CameraState out;
+void clear(CameraState& state) {
+  state.poses.clear(), state.sets.clear(), state.sensors.clear(), state.frames.clear();
+  state.kept.clear();
+}
+
+void camera_state(const Problem& problem, CameraState& out) {
+  clear(out);
   out.poses.reserve(problem.num_images());
   for (const Pose& pose : problem.poses) out.poses.push_back({pose.rotation, pose.translation});
   out.sets.reserve(problem.cameras.size());
@@ -32,6 +37,11 @@ CameraState camera_state(const Problem& problem) {
     out.sensors.push_back({pose.rotation, pose.translation});
   for (const Pose& pose : problem.rigs.rig_from_world)
     out.frames.push_back({pose.rotation, pose.translation});
+}
+
+CameraState camera_state(const Problem& problem) {
+  CameraState out;
+  camera_state(problem, out);
   return out;
 }
 

@@ -28,7 +28,10 @@ struct CameraState {
   std::vector<std::array<double, 3>> kept{};  ///< points that are not eliminated
 };
 
-/// The poses and lenses of a problem.
+/// Nothing is in it any more, and its memory is kept.
+void clear(CameraState& state);
+/// The poses and lenses of a problem; allocates nothing where `out` had as many.
+void camera_state(const Problem& problem, CameraState& out);
 CameraState camera_state(const Problem& problem);
 /// The mean camera centre, and the power of two that brings the cameras' mean distance from it next
 /// to 1: neither the place of the scene nor its unit matters about it. Summed in the images' order.

@@ -29,6 +29,13 @@ class Home : public System {
   virtual HomeHistory history() const = 0;
   /// False where it is of another home.
   virtual bool restore(const HomeHistory& history) = 0;
+  /// Begins again at another state with another problem's measurements, as a home that is made of
+  /// them would; the arrangement, which holds them, and memory stay. False, and nothing is touched,
+  /// where it does not know how. points: 3 numbers for each.
+  virtual bool restart(const CameraState&, const std::vector<double>& /*points*/) { return false; }
+  /// The root of the mean |r|^2 of the observations at the held state, px, whatever their sigmas;
+  /// negative: it does not know.
+  virtual double pixel_rms() { return -1; }
   /// Observations behind their camera at the held state, or as many as there may be.
   virtual std::uint64_t count_behind() = 0;
   /// What it holds beside its arrangement.

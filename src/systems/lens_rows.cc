@@ -3,15 +3,16 @@
 #include "systems/lens_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
 #include "geometry/camera_model.h"
+#include "lists/slices.h"
 #include "reduced/scaling.h"
 #include "systems/dogleg_passes.h"
 #include "systems/implicit_solver.h"
 #include "systems/product_sums.h"
-#include "systems/residual_quantile.h"
 
 namespace sheaf {
 
@@ -238,25 +239,42 @@ bool LensRows::sees(const LensCameras& records, const PointState& state, std::ui
                    [&](auto model) { return model.sees(state.cameras.sets[lens].data(), P); });
 }
 
-std::uint64_t LensRows::count_newly_unseen() const {
+template <class Counts>
+std::uint64_t LensRows::count_where(const Counts& counts) const {
   const Batches& batches = arranged_.batches;
-  std::vector<std::uint64_t> counts(chunks_.slices.size() - 1, 0);
-  threads_.for_each(counts.size(), [&](std::size_t s) {
+  std::array<std::uint64_t, kMostSlices> of_slice{};
+  threads_.for_each(chunks_.slices.size() - 1, [&](std::size_t s) {
     for (std::uint32_t c = chunks_.slices[s]; c < chunks_.slices[s + 1]; ++c)
       for (std::uint32_t g = chunks_.chunks[c].first_group; g < chunks_.chunks[c].end_group; ++g) {
         const Batches::Group& group = batches.groups[g];
         for (std::uint64_t b = group.first_batch; b < group.first_batch + group.track; ++b)
-          for (std::uint32_t l = 0; l < group.lanes; ++l)
-            counts[s] +=
-                !sees(tried_, state_->tried, b, l, g) && sees(held_, state_->held, b, l, g);
+          for (std::uint32_t l = 0; l < group.lanes; ++l) of_slice[s] += counts(b, l, g);
       }
   });
-  return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
+  return std::accumulate(of_slice.begin(), of_slice.end(), std::uint64_t(0));
+}
+
+std::uint64_t LensRows::count_newly_unseen() const {
+  return count_where([&](std::uint64_t b, std::uint32_t l, std::size_t g) {
+    return !sees(tried_, state_->tried, b, l, g) && sees(held_, state_->held, b, l, g);
+  });
+}
+
+std::uint64_t LensRows::count_behind() const {
+  return count_where([&](std::uint64_t b, std::uint32_t l, std::size_t g) {
+    return !sees(held_, state_->held, b, l, g);
+  });
 }
 
 double LensRows::residual_scale(double quantile) const {
   return residual_quantile(
-      arranged_.batches, chunks_, quantile, threads_,
+      arranged_.batches, chunks_, quantile, threads_, residual_scratch_,
+      [&](const Chunk& chunk, double* out) { lens_kernels_.residuals(held_input(), chunk, out); });
+}
+
+double LensRows::pixel_rms() const {
+  return sheaf::pixel_rms(
+      arranged_.batches, chunks_, threads_, residual_scratch_,
       [&](const Chunk& chunk, double* out) { lens_kernels_.residuals(held_input(), chunk, out); });
 }
 

@@ -9,6 +9,7 @@
 #include "systems/arrangement.h"
 #include "systems/dogleg_passes.h"
 #include "systems/point_rows.h"
+#include "systems/residual_quantile.h"
 
 namespace sheaf {
 
@@ -34,6 +35,8 @@ class LensRows : public PointRows {
                     Trial& out) override;
   void accepted() override { std::swap(held_, tried_); }
   double residual_scale(double quantile) const override;
+  std::uint64_t count_behind() const override;
+  double pixel_rms() const override;
   Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override;
   std::uint64_t bytes() const override;
@@ -51,6 +54,9 @@ class LensRows : public PointRows {
   }
   LensInput held_input() const;
   std::uint64_t count_newly_unseen() const;
+  /// Of the observations as (batch, lane, group).
+  template <class Counts>
+  std::uint64_t count_where(const Counts& counts) const;
   bool sees(const LensCameras& records, const PointState& state, std::uint64_t batch,
             std::uint32_t lane, std::size_t group) const;
 
@@ -65,6 +71,7 @@ class LensRows : public PointRows {
   const CameraColumns columns_;
   const SteppedState* state_ = nullptr;
   LensCameras held_, tried_;
+  mutable ResidualScratch residual_scratch_;
 };
 
 }  // namespace sheaf

@@ -91,7 +91,7 @@ MappedRows::MappedRows(std::unique_ptr<PointRows> rows, const Columns& columns, 
 
 void MappedRows::attach(const SteppedState& state) {
   state_ = &state;
-  adjoints_ = adjoints_of(state.held.cameras);
+  adjoints_of(state.held.cameras, adjoints_);
   rows_->attach(state);
 }
 
@@ -137,7 +137,7 @@ void MappedRows::step(const Buffer<double>& columns) {
 
 void MappedRows::accepted() {
   rows_->accepted();
-  adjoints_ = adjoints_of(state_->held.cameras);
+  adjoints_of(state_->held.cameras, adjoints_);
 }
 
 PointRows::Operators MappedRows::make_operators(const Columns&, bool mixed) {

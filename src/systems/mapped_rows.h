@@ -48,6 +48,7 @@ class MappedRows : public PointRows {
   }
   void accepted() override;
   double residual_scale(double quantile) const override { return rows_->residual_scale(quantile); }
+  double pixel_rms() const override { return rows_->pixel_rms(); }
   std::uint64_t count_behind() const override { return rows_->count_behind(); }
   Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override;

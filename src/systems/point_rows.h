@@ -123,6 +123,9 @@ class PointRows {
   /// The tried state became the held one.
   virtual void accepted() = 0;
 
+  /// The root of the mean |r|^2 of the observations at the held state, px, whatever their sigmas;
+  /// negative: not known.
+  virtual double pixel_rms() const { return -1; }
   /// The quantile that System::residual_scale asks for.
   virtual double residual_scale(double quantile) const = 0;
   /// Observations behind their camera at the held state, or as many as there may be.

@@ -28,6 +28,7 @@ PointSystem::PointSystem(std::unique_ptr<PointRows> rows, Start start, const Num
       camera_columns_(std::move(start.camera_columns)),
       rules_(rules),
       float_products_(plan.mixed && plan.kind == SolverKind::implicit_cg),
+      float_blocks_(plan.mixed && plan.kind == SolverKind::explicit_cg),
       threads_(threads),
       stage_(columns_) {
   state_.held.cameras = std::move(start.cameras);
@@ -42,6 +43,8 @@ PointSystem::PointSystem(std::unique_ptr<PointRows> rows, Start start, const Num
   tiles_.allocate(kTileDoubles * room(rows_->chunks().tiles.size(), rows_->more_tiles()));
   diagonal_.allocate(kDiagonalDoubles * room(rows_->num_blocks(), rows_->more_blocks()));
   scratch_.resize(static_cast<std::size_t>(threads.count()));
+  eliminated_.resize(num_slices());
+  trials_.resize(num_slices());
   set_solver(plan, columns, kernels);
 }
 
@@ -75,8 +78,8 @@ void PointSystem::set_solver(const Plan& plan, const Numbering& columns, const K
 void PointSystem::fill_points(const std::vector<double>& points) {
   const Batches& batches = rows_->batches();
   PointState &held = state_.held, &tried = state_.tried;
-  held.points.allocate(kPointGroup * batches.groups.size());
-  tried.points.allocate(held.points.size());
+  for (PointState* state : {&held, &tried})
+    if (state->points.size() == 0) state->points.allocate(kPointGroup * batches.groups.size());
   threads_.for_ranges(batches.groups.size(), kGroupsPerTask, [&](std::size_t g, std::size_t end) {
     for (; g < end; ++g)
       for (std::size_t l = 0; l < 8; ++l) {
@@ -119,12 +122,11 @@ Step PointSystem::linearize(const StepRequest& request) {
   loss_.weighted = rows_->batches().weighted();
   allocate_for_loss();
   chart_.rounding = 1e2 * (float_products_ && !request.precise ? kFloatRounding : kRounding);
-  std::vector<EliminateOutput> outputs(num_slices());
-  eliminate(request, outputs);
+  eliminate(request);
   add_slices(tiles_, num_slices(), threads_);
   add_slices(diagonal_, num_slices(), threads_);
   sums_ = rows_->finish(tiles_.data(), diagonal_.data());
-  return collect_step(request, outputs);
+  return collect_step(request);
 }
 
 void PointSystem::allocate_for_loss() {
@@ -141,7 +143,7 @@ void PointSystem::allocate_for_loss() {
   state_.own_damping.fill(0);
 }
 
-void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOutput>& outputs) {
+void PointSystem::eliminate(const StepRequest& request) {
   const Chunks& chunks = rows_->chunks();
   const std::size_t tile_doubles = kTileDoubles * chunks.tiles.size();
   const std::size_t diagonal_doubles = kDiagonalDoubles * rows_->num_blocks();
@@ -149,7 +151,7 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
                        state_.own_damping.size() > 0 ? state_.own_damping.data() : nullptr};
   CoarseSpace* const coarse = stage_.coarse();
   if (coarse != nullptr) coarse->begin(rows_->coarse_state(), request.damping);
-  threads_.for_each(outputs.size(), [&](std::size_t s) {
+  threads_.for_each(num_slices(), [&](std::size_t s) {
     poll_cancelled();
     Buffer<double>& scratch = scratch_[static_cast<std::size_t>(threads_.worker())];
     if (scratch.size() == 0) scratch.allocate(rows_->scratch());
@@ -158,20 +160,19 @@ void PointSystem::eliminate(const StepRequest& request, std::vector<EliminateOut
     std::fill_n(tiles, tile_doubles, 0.0);
     std::fill_n(diagonal, diagonal_doubles, 0.0);
     if (coarse != nullptr) coarse->clear(s);
-    outputs[s] = {state_.factors.data(),    0, 0, 0, 0, state_.metric.data(),
-                  state_.point_costs.data()};
+    EliminateOutput& out = eliminated_[s];
+    out = {state_.factors.data(), 0, 0, 0, 0, state_.metric.data(), state_.point_costs.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c) {
-      const Records records = rows_->eliminate(in, c, scratch.data(), tiles, diagonal, outputs[s]);
+      const Records records = rows_->eliminate(in, c, scratch.data(), tiles, diagonal, out);
       if (coarse != nullptr) coarse->add(s, chunks.chunks[c], records);
     }
   });
 }
 
-Step PointSystem::collect_step(const StepRequest& request,
-                               const std::vector<EliminateOutput>& outputs) {
+Step PointSystem::collect_step(const StepRequest& request) {
   double square_sum = 0, loss_sum = 0, gradient2 = 0;
   point_decrease_ = 0;
-  for (const EliminateOutput& out : outputs) {
+  for (const EliminateOutput& out : eliminated_) {
     square_sum += out.square_sum;
     loss_sum += out.loss_sum;
     point_decrease_ += out.point_decrease;
@@ -224,17 +225,16 @@ Trial PointSystem::try_step(const DoglegStep& step) {
   rows_->step(stage_.step());
   const PointTrial in = point_trial(step);
   const Chunks& chunks = rows_->chunks();
-  std::vector<TrialOutput> outputs(num_slices());
-  threads_.for_each(outputs.size(), [&](std::size_t s) {
+  threads_.for_each(num_slices(), [&](std::size_t s) {
     poll_cancelled();
-    outputs[s] = {state_.tried.points.data(), 0, 0, 0, 0, 0, 0, state_.own_damping.data()};
+    trials_[s] = {state_.tried.points.data(), 0, 0, 0, 0, 0, 0, state_.own_damping.data()};
     for (std::uint32_t c = chunks.slices[s]; c < chunks.slices[s + 1]; ++c)
-      rows_->trial(in, c, outputs[s]);
+      rows_->trial(in, c, trials_[s]);
   });
   // The decrease goes on from the points' part of the elimination.
   double decrease = point_decrease_, square_sum = 0, loss_sum = 0, step2 = 0;
   newton_damping_ = left_decrease_ = 0;
-  for (const TrialOutput& o : outputs) {
+  for (const TrialOutput& o : trials_) {
     left_decrease_ += o.left_decrease;
     square_sum += o.square_sum;
     loss_sum += o.loss_sum;
@@ -280,6 +280,29 @@ bool PointSystem::restore(const HomeHistory& history) {
   state_.own_damping.allocate(history.own_damping.size());
   std::copy(history.own_damping.begin(), history.own_damping.end(), state_.own_damping.data());
   return true;
+}
+
+/// All that a step reads of the steps before is put back to what the constructor leaves: the state,
+/// the points' own damping, what the camera solver has learnt. A coarse space is not, which has a
+/// schedule of its own, nor blocks of floats that have been given up for doubles.
+bool PointSystem::restart(const CameraState& cameras, const std::vector<double>& points) {
+  if (stage_.coarse() != nullptr || float_blocks_) return false;
+  allocate_scratch();
+  state_.held.cameras = cameras;
+  state_.tried.cameras = cameras;
+  fill_points(points);
+  rows_->attach(state_);
+  place_charts();
+  state_.own_damping.fill(0);
+  plane_.reset();
+  proposed_ = descended_ = false;
+  return stage_.restore({});
+}
+
+/// Which thread takes its first slice when is nobody's to say: whoever begins again has all of it.
+void PointSystem::allocate_scratch() {
+  for (Buffer<double>& scratch : scratch_)
+    if (scratch.size() == 0) scratch.allocate(rows_->scratch());
 }
 
 double PointSystem::residual_scale(double quantile) { return rows_->residual_scale(quantile); }

@@ -55,6 +55,8 @@ class PointSystem : public Home {
   double residual_scale(double quantile) override;
   HomeHistory history() const override;
   bool restore(const HomeHistory& history) override;
+  bool restart(const CameraState& cameras, const std::vector<double>& points) override;
+  double pixel_rms() override { return rows_->pixel_rms(); }
   const CameraState& cameras() const override { return state_.held.cameras; }
   void store_points(std::vector<double>& points) const override;
   std::uint64_t count_behind() override { return rows_->count_behind(); }
@@ -67,9 +69,10 @@ class PointSystem : public Home {
   void fill_points(const std::vector<double>& points);
   void place_charts();
   void allocate_for_loss();
+  void allocate_scratch();
   Step linearize(const StepRequest& request);
-  void eliminate(const StepRequest& request, std::vector<EliminateOutput>& outputs);
-  Step collect_step(const StepRequest& request, const std::vector<EliminateOutput>& outputs);
+  void eliminate(const StepRequest& request);
+  Step collect_step(const StepRequest& request);
   bool only_radius_is_new(const StepRequest& request) const;
   Trial try_step(const DoglegStep& step);
   double less_what_was_left(double predicted) const;
@@ -85,12 +88,15 @@ class PointSystem : public Home {
   const CameraColumns camera_columns_;
   const PointRules rules_;
   const bool float_products_;  ///< until StepRequest::precise
+  const bool float_blocks_;    ///< likewise, and then they are no more
   const Reduction& reduction_ = local_reduction();
   Threads& threads_;
   SteppedState state_;
-  ChartRules chart_;                     ///< of the points' steps
-  Buffer<double> tiles_, diagonal_;      ///< one set per slice, the first ends up as the sum
-  std::vector<Buffer<double>> scratch_;  ///< one per thread
+  ChartRules chart_;                         ///< of the points' steps
+  Buffer<double> tiles_, diagonal_;          ///< one set per slice, the first ends up as the sum
+  std::vector<Buffer<double>> scratch_;      ///< one per thread
+  std::vector<EliminateOutput> eliminated_;  ///< one per slice
+  std::vector<TrialOutput> trials_;          ///< one per slice
   CameraStage stage_;
   ReducedSums sums_{};  ///< of the last elimination
   double mean_square_ = 0, point_decrease_ = 0, trial_cost_ = 0;

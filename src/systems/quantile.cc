@@ -20,12 +20,17 @@ void QuantileSearch::narrow(const DigitCounts& counts) {
   shift_ -= kBits;
 }
 
-DigitCounts sum_of(const std::vector<DigitCounts>& parts) {
-  DigitCounts sum;
+void sum_of(const std::vector<DigitCounts>& parts, DigitCounts& sum) {
+  sum.clear();
   for (const DigitCounts& part : parts) {
     sum.resize(std::max(sum.size(), part.size()));
     for (std::size_t i = 0; i < part.size(); ++i) sum[i] += part[i];
   }
+}
+
+DigitCounts sum_of(const std::vector<DigitCounts>& parts) {
+  DigitCounts sum;
+  sum_of(parts, sum);
   return sum;
 }
 

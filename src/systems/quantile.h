@@ -21,6 +21,8 @@ class QuantileSearch {
 
   bool done() const { return shift_ < 0; }
 
+  /// Makes room for the counts of a pass, with nothing counted.
+  static void clear(DigitCounts& counts) { counts.assign(kDigits, 0); }
   /// Counts one value of a pass; counts is made large enough by the first.
   void count(double value, DigitCounts& counts) const {
     if (counts.empty()) counts.resize(kDigits);
@@ -43,5 +45,7 @@ class QuantileSearch {
 };
 
 DigitCounts sum_of(const std::vector<DigitCounts>& parts);
+/// Allocates nothing where `sum` was of such counts before.
+void sum_of(const std::vector<DigitCounts>& parts, DigitCounts& sum);
 
 }  // namespace sheaf

@@ -47,6 +47,8 @@ class TermRows : public PointRows {
                     Trial& out) override;
   void accepted() override { rows_->accepted(); }
   double residual_scale(double quantile) const override { return rows_->residual_scale(quantile); }
+  /// Observations of kept points are terms.
+  double pixel_rms() const override { return kept_ > 0 ? -1 : rows_->pixel_rms(); }
   std::uint64_t count_behind() const override { return rows_->count_behind(); }
   Operators make_operators(const Columns& columns, bool mixed) override;
   std::unique_ptr<DoglegSource> make_dogleg() override;

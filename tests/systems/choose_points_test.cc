@@ -61,10 +61,11 @@ TEST(ChoosePoints, ParallaxIsInPixelsOfTheImagesThatSeeIt) {
     problem.add_observation(1, point, 320 - 1000 / z, 240);
   }
   problem.add_observation(0, problem.add_point(0, 0, 1e9), 320, 240);  // one ray has no parallax
-  EXPECT_EQ(share_of_small_parallax(problem, {}, 5), 0.25);
-  EXPECT_EQ(share_of_small_parallax(problem, {}, 20), 0.5);
-  EXPECT_EQ(share_of_small_parallax(problem, {}, 60), 1);
-  EXPECT_EQ(share_of_small_parallax(problem, {0, 0, 0, 0, 0, 1, 0, 0, 0}, 20), 1.0 / 3);
+  ParallaxScratch scratch;
+  EXPECT_EQ(share_of_small_parallax(problem, {}, 5, scratch), 0.25);
+  EXPECT_EQ(share_of_small_parallax(problem, {}, 20, scratch), 0.5);
+  EXPECT_EQ(share_of_small_parallax(problem, {}, 60, scratch), 1);
+  EXPECT_EQ(share_of_small_parallax(problem, {0, 0, 0, 0, 0, 1, 0, 0, 0}, 20, scratch), 1.0 / 3);
 }
 
 TEST(ChoosePoints, StreetsEndWhereXyzEndsInFewerSteps) {
