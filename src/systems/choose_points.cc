@@ -59,8 +59,8 @@ double share_of_small_parallax(const Problem& problem, const std::vector<std::ui
       continue;
     }
     const Camera& camera = problem.cameras[problem.image_camera[image]];
-    const double f = camera.parameters[static_cast<std::size_t>(roles_of(camera.model).fx)];
-    at.parallax_px = std::max(at.parallax_px, std::fabs(f) * angle(at.first, ray));
+    at.parallax_px =
+        std::max(at.parallax_px, std::fabs(pixels_per_radian(camera)) * angle(at.first, ray));
   }
   std::size_t seen = 0, small = 0;
   for (const Looked& at : looked) {
