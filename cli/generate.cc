@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "counting_sink.h"
+#include "geometry/camera_model.h"
 #include "inspect/statistics.h"
 #include "interrupt.h"
 #include "json_document.h"
@@ -59,8 +60,11 @@ bool is_model(const Arguments& arguments) {
 
 // A scene of rigs or of named lenses is a COLMAP model where its name does not say otherwise.
 WriteOptions format_of(const std::string& path, const Arguments& arguments) {
-  const bool model = is_model(arguments) && std::filesystem::path(path).extension().empty();
-  return {.format = model ? "colmap" : ""};
+  if (!is_model(arguments) || !std::filesystem::path(path).extension().empty()) return {};
+  // Models that COLMAP has no number for stand in its text form by their names.
+  const auto lens = camera_model_named(arguments.lens.camera);
+  const bool unnumbered = lens && *lens != CameraModel::bal && colmap_id(*lens) < 0;
+  return {.format = unnumbered ? "colmap-text" : "colmap"};
 }
 
 Made write_whole(const Scene& scene, const Arguments& arguments, Interrupt& interrupt) {

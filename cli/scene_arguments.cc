@@ -72,7 +72,8 @@ std::vector<BoundOption> options_of(LensArguments& arguments) {
                        .unit = "deg",
                        .range = between(5, 220),
                        .help = "with --camera: full angle; not given: 65 for perspective models, "
-                               "200 for fisheyes, FOV and EUCM",
+                               "200 for fisheyes, FOV, EUCM, UCM and DOUBLE_SPHERE, 360 for "
+                               "EQUIRECTANGULAR",
                        .needs = {"camera"}})},
       arguments);
 }

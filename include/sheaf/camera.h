@@ -29,8 +29,18 @@ enum class CameraModel : std::uint8_t {
   thin_prism_fisheye,     ///< fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
   fov,                    ///< fx, fy, cx, cy, omega (rad)
   eucm,                   ///< fx, fy, cx, cy, alpha, beta; sees more than 180 degrees
+  /// fx, fy, cx, cy, k0 to k5, p0, p1, s0 to s3
+  rad_tan_thin_prism_fisheye,
+  simple_division,  ///< f, cx, cy, k
+  division,         ///< fx, fy, cx, cy, k
+  simple_fisheye,   ///< f, cx, cy
+  fisheye,          ///< fx, fy, cx, cy
+  equirectangular,  ///< w, h: the size of a panorama (px), which is never refined
+  radial_k3,        ///< f, cx, cy, k1, k2, k3
+  double_sphere,    ///< fx, fy, cx, cy, xi, alpha; sees more than 180 degrees
+  ucm,              ///< fx, fy, cx, cy, alpha; sees more than 180 degrees
 };
-inline constexpr std::size_t kCameraModels = 13;
+inline constexpr std::size_t kCameraModels = 22;
 inline constexpr std::size_t kMaxCameraParameters = 16;
 
 /// Intrinsics of one lens.
@@ -45,11 +55,13 @@ struct Camera {
 using ParameterSet = std::uint16_t;
 /// Those of the principal point: what is held unless something else is asked for.
 ParameterSet principal_point(CameraModel model);
+/// Those that say how large the images are, and nothing of a lens: they are always held.
+ParameterSet image_size(CameraModel model);
 
 std::size_t parameter_count(CameraModel model);
 std::vector<std::string_view> parameter_names(CameraModel model);
 
-/// "OPENCV" and so on, as COLMAP calls them; "BAL".
+/// "OPENCV" and so on, as COLMAP calls them; "BAL" and others that it does not have.
 std::string_view to_string(CameraModel model);
 std::optional<CameraModel> camera_model_named(std::string_view name);
 

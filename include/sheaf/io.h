@@ -50,9 +50,9 @@ struct WriteOptions {
 /// The format that a problem is written in, by the path's name: `.ply` is a point cloud with camera
 /// frusta, `.out` Bundler, `.nvm` NVM, `.problem` libmv, `.sfm` AliceVision, `reconstruction.json`
 /// OpenSfM, `sfm_data.json` OpenMVG, `transforms.json` nerfstudio, all before a `.gz` or `.bz2`;
-/// another `.json` is the JSON that was read, or "json", which `write` refuses. A folder, a
-/// name that ends in a slash and, for a problem that came from a COLMAP model, a name without
-/// extension, is a COLMAP model, in the form that was read. Anything else is BAL.
+/// another `.json` is the JSON that was read, or "json", which `write` refuses. A folder, a name
+/// with a slash at its end and, of what came from a COLMAP model, one without extension is a COLMAP
+/// model, in the form that was read, or text for lenses without number. Anything else is BAL.
 std::string write_format(const Problem& problem, const std::filesystem::path& path);
 
 /// Writes a problem, beside the target and then renamed over it; a trailing `.gz` or `.bz2`

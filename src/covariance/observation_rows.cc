@@ -71,13 +71,15 @@ void ObservationRows::evaluate(std::size_t observation, Row& out) const {
   const double* X = &problem_.points[3 * std::size_t(problem_.observation_point[observation])];
   const Matrix3<double>& R = rotations_[image];
   const Vector3<double> P = in_camera(R, problem_.poses[image], X);
-  const LensJacobian<double> lens =
-      project_with_jacobian(problem_.cameras[problem_.image_camera[image]], P);
+  const Camera& camera = problem_.cameras[problem_.image_camera[image]];
+  const LensJacobian<double> lens = project_with_jacobian(camera, P);
+  const std::array<double, 2> e =
+      residual(camera, lens.pixel, &problem_.observation_xy[2 * observation]);
   const double scale =
       problem_.observation_sigma.empty() ? 1 : 1 / problem_.observation_sigma[observation];
   std::array<double, 12> pose;
   for (std::size_t r = 0; r < 2; ++r) {
-    out.r[r] = scale * (lens.pixel[r] - problem_.observation_xy[2 * observation + r]);
+    out.r[r] = scale * e[r];
     std::array<double, 3> a;
     for (std::size_t k = 0; k < 3; ++k) a[k] = scale * lens.point[r][k];
     for (std::size_t k = 0; k < 3; ++k)

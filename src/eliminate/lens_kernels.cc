@@ -13,11 +13,10 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
-#include "eliminate/lens_dogleg-inl.h"
-#include "eliminate/lens_product-inl.h"
+#include "eliminate/lens_kernels-inl.h"
 #include "eliminate/lens_products-inl.h"
 #include "eliminate/lens_source-inl.h"
-#include "eliminate/point_trial-inl.h"
+#include "eliminate/point_pass-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sheaf {
@@ -41,47 +40,10 @@ void multiply_poses(const Chunks& chunks, const Chunk& chunk, const Records& rec
   pose_pair_products(chunks, chunk, records, tiles);
 }
 
-void try_lenses(const LensTrialInput& in, const Chunk& chunk, TrialOutput& out) {
-  try_points<LensSource>(
-      {{in.batches, in.tracks, in.held},
-       {in.batches, in.tracks, in.tried},
-       in.factors,
-       in.metric,
-       {false, in.inner_iterations, in.mean_square, in.loss, in.chart, in.blend, in.own}},
-      chunk, out);
-}
-
-void multiply_by_lenses(const LensProductInput& in, const Chunk& chunk, double* saved, double* y) {
-  const std::size_t groups = in.of.batches->groups.size();
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) {
-    prefetch_groups(in.of.at.points, in.factors, 6, g + 1, std::min<std::size_t>(g + 2, groups));
-    lens_product_group(in, g, saved, y);
-  }
-}
-
-void sum_lens_gradient(const LensProductInput& in, const Chunk& chunk, double* sums) {
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g)
-    lens_gradient_group(in, g, sums);
-}
-
-void sum_lens_curvature(const LensProductInput& in, double damping, bool points_held,
-                        const Chunk& chunk, CurvatureOutput& out) {
-  lens_curvature_chunk(in, damping, points_held, chunk, out);
-}
-
-double sum_lens_point_damping(const LensProductInput& in, const Chunk& chunk) {
-  return lens_point_damping_chunk(in, chunk);
-}
-
-void keep_lens_rows(const LensProductInput& in, double unit, const Chunk& chunk, float* rows) {
-  for (std::uint32_t g = chunk.first_group; g < chunk.end_group; ++g) keep_group(in, unit, g, rows);
-}
-
 constexpr LensKernels lens_table() {
-  return {set_name(HWY_TARGET),      &linearize_lenses,  &multiply_lenses,
-          &multiply_poses,           &try_lenses,        &multiply_by_lenses,
-          &residuals_of<LensSource>, &sum_lens_gradient, &sum_lens_curvature,
-          &sum_lens_point_damping,   &keep_lens_rows};
+  return {set_name(HWY_TARGET), &linearize_lenses,       &multiply_lenses, &multiply_poses,
+          &try_lenses,          &multiply_by_lenses,     &lens_residuals,  &sum_lens_gradient,
+          &sum_lens_curvature,  &sum_lens_point_damping, &keep_lens_rows};
 }
 
 }  // namespace HWY_NAMESPACE

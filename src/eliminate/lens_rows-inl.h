@@ -66,14 +66,24 @@ HWY_INLINE void take(hn::Mask<D> mask, const Lane& from, Lane& to) {
   to.v = hn::IfThenElse(mask, from.v, to.v);
 }
 
+/// The place of a panorama's pixels that is nearest to what was observed, across its borders.
+HWY_INLINE void join_borders(CameraModel model, const Lane* k, const Lane& observed, Lane& x) {
+  if (model == CameraModel::equirectangular)
+    x = HWY_NAMESPACE::EquirectangularLens::nearest(k, x, observed);
+}
+
 template <Wanted kWanted>
-HWY_INLINE void project_kinds(LaneKinds kinds, LensView& out) {
-  if (kinds.uniform()) return project_on_lanes<kWanted>(kinds.kind().model, out.k, out.P, out.J);
+HWY_INLINE void project_kinds(LaneKinds kinds, const Lane& observed_x, LensView& out) {
+  if (kinds.uniform()) {
+    project_on_lanes<kWanted>(kinds.kind().model, out.k, out.P, out.J);
+    return join_borders(kinds.kind().model, out.k, observed_x, out.J.pixel[0]);
+  }
   for (int r = 0; r < 2; ++r)
     for (Lane& x : out.J.parameters[r]) x = Lane(zero());
   do {
     LensJacobian<Lane> J;
     project_on_lanes<kWanted>(kinds.kind().model, out.k, out.P, J);
+    join_borders(kinds.kind().model, out.k, observed_x, J.pixel[0]);
     const hn::Mask<D> mask = kinds.mask();
     const std::size_t count =
         kWanted == Wanted::parameters ? parameter_count(kinds.kind().model) : 0;
@@ -107,7 +117,8 @@ HWY_INLINE void look(const Batches& batches, const LensTracks& tracks, const Len
     out.P[i].v = fma(out.c[3 * i], X[0],
                      fma(out.c[3 * i + 1], X[1],
                          fma(out.c[3 * i + 2], X[2], out.c[pose_record::kTranslation + i])));
-  project_kinds<kWanted>(LaneKinds(tracks, batch, lane), out);
+  project_kinds<kWanted>(LaneKinds(tracks, batch, lane), Lane(load(&batches.xy[16 * batch + lane])),
+                         out);
 }
 
 /// A R, the point's rows.

@@ -49,8 +49,10 @@ inline LensRow lens_row(const LensInput& in, const Vector3<double>& X, std::uint
   LensRow row{};
   with_lens(places.model,
             [&](auto lens) { lens.project(lens_record_of(in, batch, lane), P.data(), row.J); });
+  const double* z = &in.batches->xy[16 * batch + lane];
+  const double observed[] = {z[0], z[8]};
+  row.r = residual(places.model, lens_record_of(in, batch, lane), row.J.pixel, observed);
   for (std::size_t e = 0; e < 2; ++e) {
-    row.r[e] = row.J.pixel[e] - in.batches->xy[16 * batch + 8 * e + lane];
     const Vector3<double>& A = row.J.point[e];
     const Vector3<double> turned = cross(P, A);
     for (std::size_t i = 0; i < 3; ++i) {

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/camera_model.h"
 
+#include <algorithm>
+#include <numbers>
+
 #include "geometry/bal_camera.h"
 
 namespace sheaf {
@@ -46,6 +49,13 @@ ParameterSet principal_point(CameraModel model) {
   return static_cast<ParameterSet>(1u << roles.cx | 1u << roles.cy);
 }
 
+ParameterSet image_size(CameraModel model) {
+  return with_lens(model, [](auto lens) -> ParameterSet {
+    if constexpr (requires { decltype(lens)::kImageSize; }) return decltype(lens)::kImageSize;
+    return 0;
+  });
+}
+
 std::string_view to_string(CameraModel model) {
   return with_lens(model, [](auto lens) { return decltype(lens)::kName; });
 }
@@ -67,19 +77,29 @@ std::optional<CameraModel> camera_model_of_colmap(int id) {
 }
 
 ParameterRoles roles_of(CameraModel model) {
-  return with_lens(model, [](auto lens) {
+  // Callers ask in every solve of a window: nothing is allocated.
+  return with_lens(model, [model](auto lens) {
     ParameterRoles roles;
+    if (image_size(model) != 0) roles.fx = roles.fy = -1;
+    bool from_zero = false;  // coefficients count from k0
     const auto& names = decltype(lens)::kParameters;
     for (int i = 0; i < static_cast<int>(names.size()); ++i) {
       const std::string_view name = names[static_cast<std::size_t>(i)];
       if (name == "fy") roles.fy = i;
       if (name == "cx") roles.cx = i;
       if (name == "cy") roles.cy = i;
-      if (name == "k1" || name == "k") roles.k1 = i;
-      if (name == "k2") roles.k2 = i;
+      if (name == "k0") from_zero = true, roles.k1 = i, roles.k2 = i + 1;
+      if (!from_zero && (name == "k1" || name == "k")) roles.k1 = i;
+      if (!from_zero && name == "k2") roles.k2 = i;
     }
     return roles;
   });
+}
+
+double pixels_per_radian(const Camera& camera) {
+  const int fx = roles_of(camera.model).fx;
+  if (fx < 0) return camera.parameters[0] / (2 * std::numbers::pi);
+  return camera.parameters[static_cast<std::size_t>(fx)];
 }
 
 }  // namespace sheaf

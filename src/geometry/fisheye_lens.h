@@ -16,6 +16,34 @@ inline bool not_backwards(const T* P) {
   return P[2] > T(0) || P[0] != T(0) || P[1] != T(0);
 }
 
+/// u = f m + c
+struct SimpleFisheyeLens {
+  static constexpr int kColmapId = 14;
+  static constexpr std::string_view kName = "SIMPLE_FISHEYE";
+  static constexpr std::array<std::string_view, 3> kParameters{"f", "cx", "cy"};
+
+  template <class T>
+  static void project(const T* k, const T* P, LensJacobian<T>& out) {
+    const OnPlane<T> m = equidistant(P);
+    to_pixel<1>(k, m, {m.x, m.y, T(1), T(0), T(0), T(1)}, out);
+  }
+  static bool sees(const double*, const double* P) { return not_backwards(P); }
+};
+
+/// u = (fx m.x, fy m.y) + c
+struct FisheyeLens {
+  static constexpr int kColmapId = 15;
+  static constexpr std::string_view kName = "FISHEYE";
+  static constexpr std::array<std::string_view, 4> kParameters{"fx", "fy", "cx", "cy"};
+
+  template <class T>
+  static void project(const T* k, const T* P, LensJacobian<T>& out) {
+    const OnPlane<T> m = equidistant(P);
+    to_pixel<2>(k, m, {m.x, m.y, T(1), T(0), T(0), T(1)}, out);
+  }
+  static bool sees(const double*, const double* P) { return not_backwards(P); }
+};
+
 /// u = f (1 + k n) m + c
 struct SimpleRadialFisheyeLens {
   static constexpr int kColmapId = 8;
@@ -110,6 +138,66 @@ struct ThinPrismFisheyeLens {
     by_parameter<2>(k, 11, T(0), n, out);
   }
   static bool sees(const double*, const double* P) { return not_backwards(P); }
+};
+
+/// u = (fx, fy) (w + tangential(w) + q (s0, s2) + q^2 (s1, s3)) + c with
+/// w = (1 + k0 n + k1 n^2 + ... + k5 n^6) m and q = |w|^2: tangential and prism distortion act on
+/// what radial distortion made. p0 is the p2 of the other models, p1 their p1.
+struct RadTanThinPrismFisheyeLens {
+  static constexpr int kColmapId = 11;
+  static constexpr std::string_view kName = "RAD_TAN_THIN_PRISM_FISHEYE";
+  static constexpr std::array<std::string_view, 16> kParameters{"fx", "fy", "cx", "cy", "k0", "k1",
+                                                                "k2", "k3", "k4", "k5", "p0", "p1",
+                                                                "s0", "s1", "s2", "s3"};
+
+  template <class T>
+  static void project(const T* k, const T* P, LensJacobian<T>& out) {
+    const OnPlane<T> m = equidistant(P);
+    const T n = m.x * m.x + m.y * m.y;
+    const OnPlane<T> w = radially(k, m, n);
+    const T q = w.x * w.x + w.y * w.y;
+    Distorted<T> d{w.x, w.y, T(1), T(0), T(0), T(1)};
+    add_tangential(w, k[11], k[10], d);
+    const T across = q * (k[12] + q * k[13]), down = q * (k[14] + q * k[15]);
+    const T by_across = T(2) * (k[12] + T(2) * q * k[13]);  // d across / d w = by_across w
+    const T by_down = T(2) * (k[14] + T(2) * q * k[15]);
+    d.x = d.x + across, d.xx = d.xx + by_across * w.x, d.xy = d.xy + by_across * w.y;
+    d.y = d.y + down, d.yx = d.yx + by_down * w.x, d.yy = d.yy + by_down * w.y;
+    to_pixel<2>(k, w, d, out);
+    T power = n;
+    for (int i = 4; i < 10; ++i) {
+      const T x = power * m.x, y = power * m.y;
+      by_parameter<2>(k, i, d.xx * x + d.xy * y, d.yx * x + d.yy * y, out);
+      power = power * n;
+    }
+    const T xy = T(2) * w.x * w.y;
+    by_parameter<2>(k, 10, q + T(2) * w.x * w.x, xy, out);
+    by_parameter<2>(k, 11, xy, q + T(2) * w.y * w.y, out);
+    by_parameter<2>(k, 12, q, T(0), out);
+    by_parameter<2>(k, 13, q * q, T(0), out);
+    by_parameter<2>(k, 14, T(0), q, out);
+    by_parameter<2>(k, 15, T(0), q * q, out);
+  }
+  static bool sees(const double*, const double* P) { return not_backwards(P); }
+
+ private:
+  /// w and its derivatives by P.
+  template <class T>
+  static OnPlane<T> radially(const T* k, const OnPlane<T>& m, const T& n) {
+    T factor = k[9], slope = T(6) * k[9];
+    for (int i = 5; i > 0; --i) {
+      factor = k[3 + i] + n * factor;
+      slope = T(i) * k[3 + i] + n * slope;
+    }
+    factor = T(1) + n * factor;
+    const Distorted<T> d = radial_distortion(m, factor, slope);
+    OnPlane<T> w{d.x, d.y, {}};
+    for (int j = 0; j < 3; ++j) {
+      w.d[0][j] = d.xx * m.d[0][j] + d.xy * m.d[1][j];
+      w.d[1][j] = d.yx * m.d[0][j] + d.yy * m.d[1][j];
+    }
+    return w;
+  }
 };
 
 }  // namespace SHEAF_LENS_NAMESPACE

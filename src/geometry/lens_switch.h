@@ -4,17 +4,21 @@
 #define SHEAF_GEOMETRY_LENS_SWITCH_H_
 
 #include "geometry/bal_lens.h"
+#include "geometry/division_lens.h"
+#include "geometry/equirectangular_lens.h"
 #include "geometry/eucm_lens.h"
 #include "geometry/fisheye_lens.h"
 #include "geometry/fov_lens.h"
 #include "geometry/perspective_lens.h"
+#include "geometry/sphere_lens.h"
 
 namespace SHEAF_LENS_NAMESPACE {
 
 /// The one switch over camera models: calls use(Lens()) with the model's own type, which has
 ///   kName, kColmapId, kParameters,
 ///   project(k, P, LensJacobian&): pixel and Jacobians at P in the camera's frame, parameters k,
-///   sees(k, P): whether P lies where the model is meant to be used.
+///   sees(k, P): whether P lies where the model is meant to be used,
+///   and kImageSize where some parameters are the size of its images.
 template <class Use>
 decltype(auto) with_lens(CameraModel model, Use&& use) {
   switch (model) {
@@ -44,6 +48,24 @@ decltype(auto) with_lens(CameraModel model, Use&& use) {
       return use(FovLens());
     case CameraModel::eucm:
       return use(EucmLens());
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      return use(RadTanThinPrismFisheyeLens());
+    case CameraModel::simple_division:
+      return use(SimpleDivisionLens());
+    case CameraModel::division:
+      return use(DivisionLens());
+    case CameraModel::simple_fisheye:
+      return use(SimpleFisheyeLens());
+    case CameraModel::fisheye:
+      return use(FisheyeLens());
+    case CameraModel::equirectangular:
+      return use(EquirectangularLens());
+    case CameraModel::radial_k3:
+      return use(RadialK3Lens());
+    case CameraModel::double_sphere:
+      return use(DoubleSphereLens());
+    case CameraModel::ucm:
+      return use(UcmLens());
   }
   return use(BalLens());
 }

@@ -78,6 +78,26 @@ struct RadialLens {
   static bool sees(const double*, const double* P) { return before_plane(P); }
 };
 
+/// u = f (1 + k1 n + k2 n^2 + k3 n^3) m + c
+struct RadialK3Lens {
+  static constexpr int kColmapId = -1;  // a FULL_OPENCV lens of one focal length
+  static constexpr std::string_view kName = "RADIAL_K3";
+  static constexpr std::array<std::string_view, 6> kParameters{"f", "cx", "cy", "k1", "k2", "k3"};
+
+  template <class T>
+  static void project(const T* k, const T* P, LensJacobian<T>& out) {
+    const OnPlane<T> m = perspective(P);
+    const T n = m.x * m.x + m.y * m.y;
+    const T factor = T(1) + n * (k[3] + n * (k[4] + n * k[5]));
+    const T slope = k[3] + n * (T(2) * k[4] + T(3) * n * k[5]);
+    to_pixel<1>(k, m, radial_distortion(m, factor, slope), out);
+    by_parameter<1>(k, 3, n * m.x, n * m.y, out);
+    by_parameter<1>(k, 4, n * n * m.x, n * n * m.y, out);
+    by_parameter<1>(k, 5, n * n * n * m.x, n * n * n * m.y, out);
+  }
+  static bool sees(const double*, const double* P) { return before_plane(P); }
+};
+
 /// u = (fx, fy) ((1 + k1 n + k2 n^2) m + tangential) + c
 struct OpencvLens {
   static constexpr int kColmapId = 4;

@@ -155,7 +155,8 @@ void check_rank(const Problem& problem, FindingList& list) {
   for (const std::uint32_t c : problem.image_camera) used[c] = true;
   for (std::size_t c = 0; c < used.size(); ++c) {
     const ParameterRoles roles = roles_of(problem.cameras[c].model);
-    if (used[c]) lenses += 1u + (roles.fy != roles.fx) + (roles.k1 >= 0) + (roles.k2 >= 0);
+    if (!used[c] || roles.fx < 0) continue;
+    lenses += 1u + (roles.fy != roles.fx) + (roles.k1 >= 0) + (roles.k2 >= 0);
   }
   const std::uint64_t unknowns = 6 * moving_poses(problem) + 3 * problem.num_points() + lenses;
   const std::uint64_t measured = 2 * problem.num_observations();

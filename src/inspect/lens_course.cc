@@ -32,14 +32,23 @@ Family family_of(CameraModel model) {
     case CameraModel::radial:
     case CameraModel::opencv:
     case CameraModel::full_opencv:
+    case CameraModel::radial_k3:
       return {true, true};
     case CameraModel::opencv_fisheye:
     case CameraModel::simple_radial_fisheye:
     case CameraModel::radial_fisheye:
     case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye:
+    case CameraModel::simple_fisheye:
+    case CameraModel::fisheye:
       return {false, true};
     case CameraModel::fov:
     case CameraModel::eucm:
+    case CameraModel::simple_division:
+    case CameraModel::division:
+    case CameraModel::double_sphere:
+    case CameraModel::ucm:
+    case CameraModel::equirectangular:
       break;
   }
   return {false, false};
@@ -94,6 +103,9 @@ struct Walk {
   double m;  ///< of the last ray that was met
 };
 
+/// Whether all directions are alike to a model, which has neither a focal length nor an edge.
+bool has_no_axis(const Camera& camera) { return roles_of(camera.model).fx < 0; }
+
 /// Steps outward until the pixels reach the distance, turn back, or rays end.
 Walk walk(const HalfPlane& rays, double distance_px) {
   const double last_ray = rays.family().plane
@@ -122,6 +134,7 @@ bool absurd_focal(const Camera& camera, double half_size_px) {
   const Family family = family_of(camera.model);
   const ParameterRoles roles = roles_of(camera.model);
   for (const int which : {roles.fx, roles.fy}) {
+    if (which < 0) return false;
     const double f = camera.parameters[static_cast<std::size_t>(which)];
     if (!(f > 0)) return true;
     if (half_size_px == 0) continue;
@@ -136,20 +149,39 @@ bool absurd_focal(const Camera& camera, double half_size_px) {
 
 bool outside_model(const Camera& camera) {
   const auto& k = camera.parameters;
-  if (camera.model == CameraModel::fov) return !(std::abs(k[4]) < std::numbers::pi);
-  return camera.model == CameraModel::eucm && !(k[4] >= 0 && k[4] <= 1 && k[5] > 0);
+  const auto share = [](double alpha) { return alpha >= 0 && alpha <= 1; };
+  switch (camera.model) {
+    case CameraModel::fov:
+      return !(std::abs(k[4]) < std::numbers::pi);
+    case CameraModel::eucm:
+      return !(share(k[4]) && k[5] > 0);
+    case CameraModel::ucm:
+      return !share(k[4]);
+    case CameraModel::double_sphere:
+      return !(std::abs(k[4]) < 1 && share(k[5]));
+    case CameraModel::equirectangular:
+      return !(k[0] > 0 && k[1] > 0);
+    default:
+      return false;
+  }
 }
 
 bool absurd_distortion(const Camera& camera, const std::array<double, 2>& edge) {
-  if (edge[0] == 0 && edge[1] == 0) return false;
+  if ((edge[0] == 0 && edge[1] == 0) || has_no_axis(camera)) return false;
   const HalfPlane rays(camera, edge);
-  const double m = rays.family().polynomial ? rays.edge() : walk(rays, rays.edge_px()).m;
+  double m = rays.edge();
+  if (!rays.family().polynomial) {
+    const Walk to_edge = walk(rays, rays.edge_px());
+    m = to_edge.m;
+    if (to_edge.course == LensCourse::ends && rays.at(m).out_px < rays.edge_px() / kMostFactor)
+      return true;
+  }
   const double factor = rays.factor(m);
   return !(factor >= 1 / kMostFactor && factor <= kMostFactor);
 }
 
 LensCourse course_of(const Camera& camera, const std::array<double, 2>& edge) {
-  if (edge[0] == 0 && edge[1] == 0) return LensCourse::sound;
+  if ((edge[0] == 0 && edge[1] == 0) || has_no_axis(camera)) return LensCourse::sound;
   const HalfPlane rays(camera, edge);
   return walk(rays, kLookedAt * rays.edge_px()).course;
 }

@@ -13,13 +13,16 @@ namespace sheaf {
 /// across) for models of a plane, above 180 (360 across) for fisheyes.
 bool absurd_focal(const Camera& camera, double half_size_px);
 
-/// Parameters for which a model's formula is not meant: EUCM's alpha outside [0, 1] or beta not
-/// above 0, FOV's omega of pi or more.
+/// Parameters for which a model's formula is not meant: an alpha outside [0, 1] (EUCM, UCM,
+/// DOUBLE_SPHERE), EUCM's beta not above 0, DOUBLE_SPHERE's xi not between -1 and 1, FOV's omega of
+/// pi or more, EQUIRECTANGULAR's w or h not above 0.
 bool outside_model(const Camera& camera);
 
 /// Whether distortion moves the edge, a pixel less the principal point, to less than a tenth of its
 /// distance from there or to more than ten times it. The ray is the one that meets the edge without
-/// distortion; with FOV and EUCM, which have no such ray, the one that meets it, or the last one.
+/// distortion; with models that have no such ray (FOV, EUCM, UCM, DOUBLE_SPHERE and the division
+/// models) the one that meets it, or the last one, which has to get a tenth of the way. Never with
+/// EQUIRECTANGULAR.
 bool absurd_distortion(const Camera& camera, const std::array<double, 2>& edge);
 
 /// What a lens makes of one half plane of rays, from its axis to where they meet an edge. Nine

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "geometry/camera_model.h"
 #include "scene/point_errors.h"
 #include "scene/rigs.h"
 
@@ -48,7 +49,7 @@ Statistics statistics_of(const Problem& problem) {
     out.mean_observations_per_image =
         static_cast<double>(problem.num_observations()) / static_cast<double>(problem.num_images());
   std::vector<double> focal;
-  for (const Camera& camera : problem.cameras) focal.push_back(camera.parameters[0]);
+  for (const Camera& camera : problem.cameras) focal.push_back(pixels_per_radian(camera));
   out.focal_px = range_of(std::move(focal));
   double sum = 0;
   std::size_t known = 0;

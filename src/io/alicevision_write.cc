@@ -77,7 +77,8 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
     out.type = "brown";
     out.distortion = {radial[0], radial[1], radial[2], tangential[0], tangential[1]};
   } else if (out.lens.radial_terms() > 1 || camera.model == CameraModel::radial ||
-             camera.model == CameraModel::full_opencv || camera.model == CameraModel::opencv) {
+             camera.model == CameraModel::radial_k3 || camera.model == CameraModel::full_opencv ||
+             camera.model == CameraModel::opencv) {
     out.type = "radial3";
     out.distortion.assign(radial.begin(), radial.end());
   } else if (camera.model == CameraModel::simple_radial) {

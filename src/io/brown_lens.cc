@@ -18,6 +18,7 @@ bool is_polynomial(CameraModel model) {
     case CameraModel::radial:
     case CameraModel::opencv:
     case CameraModel::full_opencv:
+    case CameraModel::radial_k3:
       return true;
     default:
       return false;
@@ -41,9 +42,10 @@ std::array<double*, 9> numbers_of(BrownLens& lens) {
 }
 
 CameraModel model_for(const BrownLens& lens, const BrownTerms& terms) {
-  if (terms.radial > 2) return CameraModel::full_opencv;
-  if (terms.tangential) return CameraModel::opencv;
   const bool two = terms.two_focals || lens.fx != lens.fy;
+  if (terms.radial > 2)
+    return two || terms.tangential ? CameraModel::full_opencv : CameraModel::radial_k3;
+  if (terms.tangential) return CameraModel::opencv;
   if (terms.radial == 0) return two ? CameraModel::pinhole : CameraModel::simple_pinhole;
   if (two) return CameraModel::opencv;
   return terms.radial == 1 ? CameraModel::simple_radial : CameraModel::radial;
@@ -69,6 +71,12 @@ Result<BrownLens> brown_lens(const Camera& camera) {
     }
   }
   return out;
+}
+
+bool is_whole_panorama(const Camera& camera) {
+  const double w = camera.parameters[0], h = camera.parameters[1];
+  return w > 0 && w == 2 * h && w == static_cast<double>(camera.width_px) &&
+         h == static_cast<double>(camera.height_px);
 }
 
 CameraOfFile camera_of(const BrownLens& lens, const BrownTerms& terms, std::uint64_t width,

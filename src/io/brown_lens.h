@@ -38,8 +38,12 @@ struct CameraOfFile {
   ParameterSet unknown = 0;  ///< parameters that the file's lens does not have
 };
 
-/// The simplest model that holds the lens: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV
-/// or FULL_OPENCV. `width` and `height` in pixels.
+/// Whether a panorama is twice as wide as high and as large as its images: what formats that scale
+/// both angles by the larger side can state.
+bool is_whole_panorama(const Camera& camera);
+
+/// The simplest model that holds the lens: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL,
+/// RADIAL_K3, OPENCV or FULL_OPENCV. `width` and `height` in pixels.
 CameraOfFile camera_of(const BrownLens& lens, const BrownTerms& terms, std::uint64_t width,
                        std::uint64_t height);
 

@@ -40,7 +40,8 @@ Result<void> can_hold(const std::string& format, const Problem& problem) {
   const Problem given = without_points(problem);
   const FileFormat* known = format_named(format);
   if (known != nullptr && known->format != nullptr) return as(format, known->format(given));
-  if (format == "colmap-text") return as(format, format_colmap(given, true));
+  if (format.starts_with("colmap"))
+    return as(format, format_colmap(given, format == "colmap-text"));
   if (format != "bal") return {};
   Problem turned;
   return as(format, with_bal_cameras(given, turned));

@@ -36,6 +36,7 @@ std::string known_models() {
   std::string out;
   for (std::size_t i = 1; i < kCameraModels; ++i) {
     const auto model = static_cast<CameraModel>(i);
+    if (colmap_id(model) < 0) continue;
     out += (i > 1 ? ", " : "") + std::to_string(colmap_id(model)) + " " +
            std::string(to_string(model));
   }

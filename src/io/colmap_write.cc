@@ -4,7 +4,9 @@
 #include <numeric>
 #include <optional>
 
+#include "geometry/camera_model.h"
 #include "io/colmap_form.h"
+#include "io/colmap_lens.h"
 #include "io/colmap_rigs.h"
 #include "io/line_cursor.h"
 #include "io/output_folder.h"
@@ -131,6 +133,17 @@ std::array<double, 7> stated_pose(const Problem& problem, std::size_t image, std
   return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
 }
 
+/// The text form names models, the binary form numbers them as COLMAP does.
+Result<void> check_lenses(const Problem& problem, bool text) {
+  for (std::size_t c = 0; c < problem.cameras.size() && !text; ++c)
+    if (!colmap_lens(problem.cameras[c]))
+      return Error(ErrorCode::usage, "camera " + std::to_string(c) + " is " +
+                                         std::string(to_string(problem.cameras[c].model)) +
+                                         ", which COLMAP has no number for; its text form names "
+                                         "models (--format colmap-text)");
+  return {};
+}
+
 }  // namespace
 
 ColmapForm colmap_form(const Problem& problem, const std::string& format) {
@@ -165,6 +178,7 @@ Result<ColmapFiles> format_colmap(const Problem& given, bool text) {
   if (Result<void> good = check_names(form, text); !good.ok()) return good.error();
   const SourceFiles* source = given.metadata ? given.metadata->source.get() : nullptr;
   ColmapFiles files;
+  if (Result<void> good = check_lenses(*problem, text); !good.ok()) return good.error();
   if (text) {
     files = text_files(form, source && source->format == "colmap-text" ? source : nullptr);
   } else {

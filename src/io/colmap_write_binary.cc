@@ -5,6 +5,7 @@
 
 #include "geometry/camera_model.h"
 #include "io/colmap_form.h"
+#include "io/colmap_lens.h"
 
 namespace sheaf {
 namespace {
@@ -21,7 +22,7 @@ std::string cameras_binary(const ColmapForm& form) {
   std::string out;
   put(out, std::uint64_t{form.problem->cameras.size()});
   for (std::size_t c = 0; c < form.problem->cameras.size(); ++c) {
-    const Camera& camera = form.problem->cameras[c];
+    const Camera camera = *colmap_lens(form.problem->cameras[c]);
     put(out, form.camera_ids[c]);
     put(out, static_cast<std::uint32_t>(colmap_id(camera.model)));
     put(out, camera.width_px);

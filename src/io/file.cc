@@ -10,6 +10,7 @@
 #include "io/bal_sink.h"
 #include "io/byte_source.h"
 #include "io/colmap.h"
+#include "io/colmap_lens.h"
 #include "io/format.h"
 #include "io/line_cursor.h"
 #include "io/output_file.h"
@@ -258,6 +259,11 @@ const Problem& placed(const Problem& problem, Problem& moved) {
   return problem;
 }
 
+/// Whether COLMAP's binary form can say of the lens what it is.
+bool is_numbered(const Camera& camera) {
+  return camera.model == CameraModel::bal || colmap_lens(camera).has_value();
+}
+
 }  // namespace
 
 Result<InputFile> read_file(const fs::path& path, const ReadOptions& options) {
@@ -292,8 +298,10 @@ std::string write_format(const Problem& problem, const fs::path& path) {
   const bool from_colmap = read_as.starts_with("colmap");
   std::error_code ignored;
   const bool folder = !path.empty() && (!path.has_filename() || fs::is_directory(path, ignored));
-  if (folder || (from_colmap && path.extension().empty())) return from_colmap ? read_as : "colmap";
-  return "bal";
+  if (!folder && !(from_colmap && path.extension().empty())) return "bal";
+  if (from_colmap) return read_as;
+  return std::all_of(problem.cameras.begin(), problem.cameras.end(), is_numbered) ? "colmap"
+                                                                                  : "colmap-text";
 }
 
 Result<void> write(const Problem& given, const fs::path& path, const WriteOptions& options) {

@@ -65,6 +65,8 @@ std::optional<Error> Reader::lens() {
   // One focal length, as the file has it, where a model allows it.
   if (k[5] == 0 && k[6] == 0 && k[7] == 0) {
     problem.cameras.push_back({CameraModel::radial, {k[0], k[1], k[2], k[3], k[4]}});
+  } else if (k[6] == 0 && k[7] == 0) {
+    problem.cameras.push_back({CameraModel::radial_k3, {k[0], k[1], k[2], k[3], k[4], k[5]}});
   } else {
     problem.cameras.push_back(
         {CameraModel::full_opencv, {k[0], k[0], k[1], k[2], k[3], k[4], k[6], k[7], k[5]}});

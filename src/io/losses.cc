@@ -1,7 +1,9 @@
 // Copyright (c) 2026, the Sheaf authors.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <map>
 
+#include "geometry/camera_model.h"
 #include "io/colmap_rigs.h"
 #include "io/format.h"
 #include "scene/camera_frame.h"
@@ -69,6 +71,25 @@ void add_cut_names(const Problem& problem, Sentences& out) {
                   "binary form (--format colmap) keeps them");
 }
 
+/// Of models that COLMAP does not have.
+void add_unnumbered_lenses(bool text, const Problem& problem, Sentences& out) {
+  std::map<CameraModel, std::size_t> counts;
+  for (const Camera& camera : problem.cameras)
+    if (camera.model != CameraModel::bal && colmap_id(camera.model) < 0) ++counts[camera.model];
+  for (const auto& [model, count] : counts) {
+    const std::string lenses =
+        std::to_string(count) + " lenses are " + std::string(to_string(model));
+    if (text)
+      out.push_back(lenses + ", a model that COLMAP itself does not have and does not read");
+    else if (model == CameraModel::ucm)
+      out.push_back(lenses + ", which COLMAP has as EUCM with beta = 1: they are written so");
+    else if (model == CameraModel::radial_k3)
+      out.push_back(lenses +
+                    ", which COLMAP has as FULL_OPENCV with fx = fy and p1, p2, k4, k5, k6 "
+                    "= 0: they are written so");
+  }
+}
+
 void add_term_losses(const Problem& problem, Sentences& out) {
   if (!problem.observation_sigma.empty()) out.push_back("sigmas of observations are not written");
   const Terms& terms = problem.terms;
@@ -90,6 +111,7 @@ Sentences lost_in(const std::string& format, const Problem& problem) {
   if (colmap && m && m->source && m->source->listed_images > problem.num_images())
     out.push_back("images that were never placed are not written");
   if (format == "colmap-text") add_cut_names(problem, out);
+  if (colmap) add_unnumbered_lenses(format == "colmap-text", problem, out);
   const FileFormat* known = format_named(format);
   if (colmap || known == nullptr) return out;
   const FormatHolds& holds = known->holds;

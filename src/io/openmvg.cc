@@ -18,6 +18,14 @@ using Kind = JsonValue::Kind;
 /// What cereal adds to the ids of pointers and types where they occur first.
 constexpr double kFirst = 2147483648.0;
 
+/// A whole panorama; OpenMVG and EQUIRECTANGULAR agree on those alone.
+CameraOfFile panorama_of(double width, double height) {
+  return {{CameraModel::equirectangular,
+           {width, height},
+           static_cast<std::uint64_t>(width),
+           static_cast<std::uint64_t>(height)}};
+}
+
 class Reading : JsonReading {
  public:
   explicit Reading(const FormatInput& input) : JsonReading(input.name), input_(input) {}
@@ -97,16 +105,17 @@ class Reading : JsonReading {
     const std::string type = type_of(*value);
     const JsonValue* data = error_ ? nullptr : data_of(*value, intrinsics_);
     if (data == nullptr) return;
-    if (type == "spherical")
-      return refuse(value->line, "a lens of the type spherical",
-                    "one that Sheaf has a model of: pinhole, pinhole_radial_k1, pinhole_radial_k3, "
-                    "pinhole_brown_t2 or fisheye");
     // Some types have the members of a pinhole in an object of their own.
     const JsonValue* base = data->find("value0");
     const JsonValue& of_pinhole = base != nullptr && base->kind == Kind::object ? *base : *data;
     const auto width = number(of_pinhole, "width"), height = number(of_pinhole, "height");
     if (!error_ && !(width >= 0 && width <= 1e9 && height >= 0 && height <= 1e9))
       refuse(data->line, "an absurd size of images", "a number of pixels");
+    if (!error_ && type == "spherical" && !(width == 2 * height && width > 0))
+      refuse(data->line, "a spherical lens whose images are not twice as wide as high",
+             "a whole panorama");
+    if (!error_ && type == "spherical")
+      return check(v, model_.add_intrinsic(key, panorama_of(width, height), ""), "ids that differ");
     BrownLens lens;
     lens.fx = lens.fy = above_zero(of_pinhole, "focal_length");
     const auto centre = list<2>(of_pinhole, "principal_point");
@@ -146,7 +155,7 @@ class Reading : JsonReading {
     }
     refuse(value.line, "a lens of the type " + type,
            "one that Sheaf has a model of: pinhole, pinhole_radial_k1, pinhole_radial_k3, "
-           "pinhole_brown_t2 or fisheye");
+           "pinhole_brown_t2, fisheye or spherical");
     return {};
   }
 

@@ -13,6 +13,7 @@ namespace sheaf {
 /// they are, as OpenMVG's own export to COLMAP does. The lenses, with one focal length:
 ///   pinhole, pinhole_radial_k1, pinhole_radial_k3, pinhole_brown_t2   the simplest that holds them
 ///   fisheye                                                           OPENCV_FISHEYE
+///   spherical, twice as wide as high                                  EQUIRECTANGULAR
 /// Others are refused by name.
 bool is_openmvg(const JsonValue& root);
 Result<Problem> parse_openmvg(const FormatInput& input);

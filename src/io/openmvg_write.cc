@@ -41,6 +41,11 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
                   " lens two, fx and fy (--fix f keeps equal ones equal)");
   };
   const auto& k = camera.parameters;
+  if (camera.model == CameraModel::equirectangular) {
+    if (!is_whole_panorama(camera))
+      return refuse("its panoramas are twice as wide as high, and have the size of their images");
+    return Intrinsics{"spherical", nullptr, 0, 0, 0, {}};
+  }
   if (camera.model == CameraModel::opencv_fisheye) {
     if (k[0] != k[1]) return two_focals();
     return Intrinsics{"fisheye", "fisheye", k[0], k[2], k[3], {k.begin() + 4, k.begin() + 8}};
@@ -127,10 +132,16 @@ void put_intrinsics(std::uint32_t id, const Camera& camera, const Intrinsics& in
   writer.open_item(id);
   writer.put_type(in.type);
   writer.open_pointer();
+  const bool panorama = camera.model == CameraModel::equirectangular;
+  if (panorama) out.key("value0"), out.open('{');
   out.member("width", camera.width_px);
   out.member("height", camera.height_px);
-  out.member("focal_length", in.f);
-  out.list_member("principal_point", std::array{in.cx, in.cy});
+  if (panorama) {
+    out.close('}');
+  } else {
+    out.member("focal_length", in.f);
+    out.list_member("principal_point", std::array{in.cx, in.cy});
+  }
   if (in.coefficients != nullptr) out.list_member(in.coefficients, in.distortion);
   writer.close_pointer();
   writer.close_item();

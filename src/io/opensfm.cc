@@ -79,6 +79,7 @@ class Reading : JsonReading {
     if (error_) return;
     const std::string type = v.find("projection_type") ? text(v, "projection_type") : "perspective";
     const auto side = static_cast<double>(std::max(width, height));
+    if (type == "spherical") return read_panorama(id, v, width, height);
     BrownLens lens;
     lens.cx = static_cast<double>(width) / 2 + side * optional(v, "c_x");
     lens.cy = static_cast<double>(height) / 2 + side * optional(v, "c_y");
@@ -108,8 +109,25 @@ class Reading : JsonReading {
     } else {
       return refuse(*v.find("projection_type"),
                     "a lens that Sheaf has a model of: perspective, simple_radial, radial, brown, "
-                    "fisheye or fisheye_opencv");
+                    "fisheye, fisheye_opencv or spherical");
     }
+    add_camera(id, v, out);
+  }
+
+  void read_panorama(const std::string& id, const JsonValue& v, std::uint64_t width,
+                     std::uint64_t height) {
+    CameraOfFile out;
+    out.camera = {CameraModel::equirectangular,
+                  {static_cast<double>(width), static_cast<double>(height)},
+                  width,
+                  height};
+    if (!is_whole_panorama(out.camera))
+      return refuse(v.line, "a spherical lens whose images are not twice as wide as high",
+                    "a whole panorama");
+    add_camera(id, v, out);
+  }
+
+  void add_camera(const std::string& id, const JsonValue& v, const CameraOfFile& out) {
     if (!camera_of_id_.emplace(id, problem_.cameras.size()).second)
       return refuse(v.line, "camera " + sheaf::quoted(id) + " twice", "ids that differ");
     problem_.cameras.push_back(out.camera);

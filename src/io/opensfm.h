@@ -16,6 +16,7 @@ namespace sheaf {
 ///   perspective                                 RADIAL
 ///   simple_radial, radial, brown                the simplest of docs/cameras.md that holds them
 ///   fisheye, fisheye_opencv                     RADIAL_FISHEYE, OPENCV_FISHEYE
+///   spherical, twice as wide as high            EQUIRECTANGULAR
 /// Others are refused by name. Of a list the first is read, as the largest stands there.
 bool is_opensfm(const JsonValue& root);
 Result<Problem> parse_opensfm(const FormatInput& input);

@@ -57,6 +57,14 @@ Result<void> put_camera(std::size_t c, const Camera& camera, JsonText& out) {
   if (camera.width_px == 0 || camera.height_px == 0)
     return refuse(c, "its images' size is not known, which is its unit");
   const auto& k = camera.parameters;
+  if (camera.model == CameraModel::equirectangular) {
+    if (!is_whole_panorama(camera))
+      return refuse(c, "its panoramas are twice as wide as high, and have their images' size");
+    out.member("projection_type", std::string_view("spherical"));
+    out.member("width", camera.width_px);
+    out.member("height", camera.height_px);
+    return {};
+  }
   if (camera.model == CameraModel::radial_fisheye || camera.model == CameraModel::opencv_fisheye ||
       camera.model == CameraModel::simple_radial_fisheye) {
     const bool opencv = camera.model == CameraModel::opencv_fisheye;

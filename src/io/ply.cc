@@ -213,7 +213,7 @@ void put_frusta(const Problem& problem, double depth, const Colour& colour, Bina
   const auto half = half_sizes(problem);
   for (std::size_t i = 0; i < problem.num_images(); ++i) {
     const Vector3<double> centre = centre_of(problem.poses[i]);
-    const double f = std::abs(problem.cameras[problem.image_camera[i]].parameters[0]);
+    const double f = std::abs(pixels_per_radian(problem.cameras[problem.image_camera[i]]));
     // Undefined where f or the observations are missing or absurd: then an ordinary lens.
     auto slope = [&](double half_px, double ordinary) {
       const double s = half_px / f;

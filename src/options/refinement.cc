@@ -328,6 +328,7 @@ std::string held_text(const Refinement& refinement, const Problem& problem) {
                     std::to_string(sensors) + " sensors");
   std::map<std::string, std::size_t> lenses;
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    if (image_size(problem.cameras[c].model) != 0) continue;  // nothing of it ever moves
     std::vector<std::string_view> names = parameter_names(problem.cameras[c].model);
     const std::size_t count = names.size();
     std::size_t k = 0;

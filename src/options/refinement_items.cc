@@ -51,9 +51,11 @@ bool wrong_reach(std::string_view name, bool named) {
 }
 
 bool is_parameter(std::string_view name) {
-  for (std::size_t m = 0; m < kCameraModels; ++m)
-    for (const std::string_view known : parameter_names(static_cast<CameraModel>(m)))
-      if (name == known) return true;
+  for (std::size_t m = 0; m < kCameraModels; ++m) {
+    const auto model = static_cast<CameraModel>(m);
+    for (const std::string_view known : parameter_names(model))
+      if (name == known && image_size(model) == 0) return true;
+  }
   return false;
 }
 
@@ -164,7 +166,7 @@ std::uint16_t parameters_of(const RefinementItem& item, CameraModel model) {
     const bool whole = item.part == Part::lens || item.part == Part::image;
     if (single || whole || item.part == kind_of(names[k])) bits |= 1u << k;
   }
-  return static_cast<std::uint16_t>(bits);
+  return static_cast<std::uint16_t>(bits & ~unsigned{image_size(model)});
 }
 
 Result<Named> images_named(const RefinementItem& item, const Problem& problem) {

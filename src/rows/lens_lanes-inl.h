@@ -40,6 +40,7 @@ HWY_INLINE Lane select(const LaneMask& condition, const Lane& yes, const Lane& n
   return Lane(hn::IfThenElse(condition.m, yes.v, no.v));
 }
 HWY_INLINE Lane sqrt(const Lane& a) { return Lane(hn::Sqrt(a.v)); }
+HWY_INLINE Lane floor(const Lane& a) { return Lane(hn::Floor(a.v)); }
 
 /// Of 0 <= q <= 1, within 2 ulp: tan(k pi / 8 + t) with |t| <= pi / 16, then the series of t.
 HWY_INLINE V atan_unit(V q) {
@@ -93,31 +94,10 @@ namespace HWY_NAMESPACE {
 /// What is wanted of a lens; the rest of its results is left as it was.
 enum class Wanted { pixel, point, parameters };
 
+/// Writes to `out` what is wanted of the point P in the camera's frame through a lens with the
+/// parameters k. Defined in lens_lanes.cc: files of kernels do not repeat the models' bodies.
 template <Wanted kWanted>
-struct ProjectOnLanes {
-  const Lane* k;
-  const Lane* P;
-  LensJacobian<Lane>& out;
-
-  template <class Lens>
-  HWY_INLINE void operator()(Lens) const {
-    if constexpr (kWanted == Wanted::parameters) return Lens::project(k, P, out);
-    LensJacobian<Lane> J;
-    Lens::project(k, P, J);
-    for (int r = 0; r < 2; ++r) {
-      out.pixel[r] = J.pixel[r];
-      if constexpr (kWanted != Wanted::pixel)
-        for (int i = 0; i < 3; ++i) out.point[r][i] = J.point[r][i];
-    }
-  }
-};
-
-/// The models' bodies stand here once for each of what is wanted.
-template <Wanted kWanted>
-HWY_NOINLINE void project_on_lanes(CameraModel model, const Lane* k, const Lane* P,
-                                   LensJacobian<Lane>& out) {
-  HWY_NAMESPACE::with_lens(model, ProjectOnLanes<kWanted>{k, P, out});
-}
+void project_on_lanes(CameraModel model, const Lane* k, const Lane* P, LensJacobian<Lane>& out);
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sheaf

@@ -168,14 +168,22 @@ void move_outlier(Problem& problem, std::uint64_t i, const NoiseOptions& o) {
   problem.observation_xy[2 * i + 1] += o.outlier_px * direction.sine;
 }
 
-// Distance in front of the image plane; BAL cameras look along -z, all others along +z.
+// Distance in front of the image plane; BAL cameras look along -z, all others along +z. Panoramas
+// have no such plane: there the distance from the centre.
 double depth_of(const Problem& problem, const std::vector<Matrix3<double>>& rotations,
                 std::uint64_t i) {
   const std::uint32_t j = problem.observation_image[i];
   const double* X = &problem.points[3 * std::size_t{problem.observation_point[i]}];
   const Matrix3<double>& R = rotations[j];
-  const double z = R[6] * X[0] + R[7] * X[1] + R[8] * X[2] + problem.poses[j].translation[2];
-  return problem.cameras[problem.image_camera[j]].model == CameraModel::bal ? -z : z;
+  const auto& t = problem.poses[j].translation;
+  const auto along = [&](std::size_t k) {
+    return R[3 * k] * X[0] + R[3 * k + 1] * X[1] + R[3 * k + 2] * X[2] + t[k];
+  };
+  const double z = along(2);
+  const CameraModel model = problem.cameras[problem.image_camera[j]].model;
+  if (model == CameraModel::equirectangular)
+    return std::sqrt(along(0) * along(0) + along(1) * along(1) + z * z);
+  return model == CameraModel::bal ? -z : z;
 }
 
 // The outliers among the observations that are left, by their new numbers.

@@ -20,9 +20,8 @@ std::vector<double> residual_lengths(const Problem& problem) {
     const double* X = &problem.points[3 * std::size_t{problem.observation_point[i]}];
     Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
     for (std::size_t k = 0; k < 3; ++k) P[k] += problem.poses[image].translation[k];
-    const auto u = project(problem.cameras[problem.image_camera[image]], P).pixel;
-    const double x = u[0] - problem.observation_xy[2 * i],
-                 y = u[1] - problem.observation_xy[2 * i + 1];
+    const Camera& camera = problem.cameras[problem.image_camera[image]];
+    const auto [x, y] = residual(camera, project(camera, P).pixel, &problem.observation_xy[2 * i]);
     lengths[i] = std::sqrt(x * x + y * y);  // std::hypot's bits depend on the processor
   }
   return lengths;

@@ -201,9 +201,9 @@ Evaluation evaluate(const Problem& problem) {
     const auto& t = poses[image].translation;
     Vector3<double> P = multiply(rotations[image], Vector3<double>{X[0], X[1], X[2]});
     for (int j = 0; j < 3; ++j) P[j] += t[j];
-    const Projected u = project(problem.cameras[problem.image_camera[image]], P);
-    const double dx = u.pixel[0] - problem.observation_xy[2 * i];
-    const double dy = u.pixel[1] - problem.observation_xy[2 * i + 1];
+    const Camera& camera = problem.cameras[problem.image_camera[image]];
+    const Projected u = project(camera, P);
+    const auto [dx, dy] = residual(camera, u.pixel, &problem.observation_xy[2 * i]);
     const double square = dx * dx + dy * dy;
     if (!u.before) out.behind.push_back(i);
     if (!std::isfinite(square)) {
@@ -231,7 +231,7 @@ std::vector<ParameterSet> held_parameters(const Problem& problem, const Fixed& f
     if (fixed.f) set |= bit(role.fx) | bit(role.fy);
     if (fixed.k1) set |= bit(role.k1);
     if (fixed.k2) set |= bit(role.k2);
-    held.push_back(fixed.intrinsics ? kAll : set);
+    held.push_back(fixed.intrinsics ? kAll : static_cast<ParameterSet>(set | image_size(model)));
   }
   for (std::uint32_t c : fixed.camera_ids) held[c] = kAll;
   for (std::uint32_t c : fixed.k1_ids) held[c] |= bit(roles[c].k1);

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "geometry/camera_model.h"
 #include "platform/random.h"
@@ -20,9 +21,20 @@ constexpr double kMostNarrowDeg = 110, kMostWideDeg = 220;
 
 enum Stream : std::uint64_t { kLenses = 1 };
 
+/// Of RAD_TAN_THIN_PRISM_FISHEYE, whose coefficients count from 0.
+double usual_from_zero(std::string_view name) {
+  constexpr std::pair<std::string_view, double> kUsual[] = {
+      {"k0", -0.02}, {"k1", 0.003}, {"k2", -6e-4}, {"k3", 5e-5},  {"k4", -2e-6}, {"k5", 5e-8},
+      {"p0", -4e-4}, {"p1", 6e-4},  {"s0", 5e-4},  {"s1", -5e-5}, {"s2", -3e-4}, {"s3", 4e-5}};
+  for (const auto& [known, value] : kUsual)
+    if (known == name) return value;
+  return 0;
+}
+
 /// Distortion as real lenses have it; perspective models lose a tenth at the corners of 65 degrees,
 /// and fisheyes grow monotonically to 110 degrees from the axis.
 double usual(CameraModel model, std::string_view name) {
+  if (model == CameraModel::rad_tan_thin_prism_fisheye) return usual_from_zero(name);
   const bool fisheye = is_fisheye(model);
   if (name == "k") return fisheye ? -0.02 : -0.12;
   if (name == "k1") return fisheye ? -0.02 : -0.15;
@@ -36,13 +48,15 @@ double usual(CameraModel model, std::string_view name) {
   if (name == "sx1") return 5e-4;
   if (name == "sy1") return -3e-4;
   if (name == "omega") return 0.9;
-  if (name == "alpha") return 0.62;
+  if (name == "xi") return -0.15;
+  if (name == "alpha") return model == CameraModel::double_sphere ? 0.58 : 0.62;
   return name == "beta" ? 1.05 : 0;
 }
 
 /// A lens whose image is as large as its sensor: the diagonal of a 3:2 frame spans the field of
 /// view, or the circle of a fisheye fills a square one.
 Camera usual_lens(CameraModel model, double half_view_rad) {
+  if (model == CameraModel::equirectangular) return {model, {2000, 1000}, 2000, 1000};
   const bool square = is_fisheye(model);
   Camera lens{model, {}, square ? 1600u : 1800u, square ? 1600u : 1200u};
   const std::vector<std::string_view> names = parameter_names(model);
@@ -71,6 +85,12 @@ bool is_fisheye(CameraModel model) {
     case CameraModel::thin_prism_fisheye:
     case CameraModel::fov:
     case CameraModel::eucm:
+    case CameraModel::rad_tan_thin_prism_fisheye:
+    case CameraModel::simple_fisheye:
+    case CameraModel::fisheye:
+    case CameraModel::double_sphere:
+    case CameraModel::ucm:
+    case CameraModel::equirectangular:
       return true;
     default:
       return false;
@@ -93,6 +113,7 @@ Result<double> field_of_view_deg(const LensSceneOptions& options) {
   const bool fisheye = is_fisheye(options.model);
   const double most = fisheye ? kMostWideDeg : kMostNarrowDeg;
   const double view = options.field_of_view_deg;
+  if (view == 0 && options.model == CameraModel::equirectangular) return 360;
   if (view == 0) return fisheye ? kWideDeg : kNarrowDeg;
   if (view >= 5 && view <= most) return view;
   return Error(ErrorCode::usage, "the field of view of a synthetic " +
@@ -114,7 +135,7 @@ std::vector<Camera> draw_lenses(CameraModel asked, double half_view_rad, std::ui
     for (int i = 0; i < static_cast<int>(parameter_count(model)); ++i) {
       double& k = lens.parameters[static_cast<std::size_t>(i)];
       const double other = random.normal();
-      if (c == 0 || i == role.cx || i == role.cy) continue;
+      if (c == 0 || i == role.cx || i == role.cy || image_size(model) != 0) continue;
       k *= i == role.fx || i == role.fy ? std::clamp(zoom, 0.9, 1.1) : 1 + 0.05 * other;
     }
     lenses.push_back(lens);

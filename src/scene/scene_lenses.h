@@ -13,7 +13,7 @@ namespace sheaf {
 /// Lenses of scenes. All numbers come out of correctly rounded operations: the same bits on every
 /// machine.
 
-/// Whether the model is one of the wide ones: fisheyes, FOV and EUCM.
+/// Whether the model is one of the wide ones: fisheyes, FOV, EUCM, UCM, DOUBLE_SPHERE, panoramas.
 bool is_fisheye(CameraModel model);
 
 /// Full angle of view. Errors: ErrorCode::usage for a field of view that the model does not have.

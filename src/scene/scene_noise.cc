@@ -14,6 +14,14 @@ namespace {
 
 constexpr std::uint64_t kLenses = 17;  // a stream of the seed
 
+/// The domain of unified models, and of what they see, ends at alpha = 1.
+void keep_in_domain(Camera& lens) {
+  double& last = lens.parameters[lens.model == CameraModel::double_sphere ? 5 : 4];
+  if (lens.model == CameraModel::eucm || lens.model == CameraModel::ucm)
+    last = std::min(last, 0.75);
+  if (lens.model == CameraModel::double_sphere) last = std::min(last, 0.65);
+}
+
 }  // namespace
 
 /// t = -R C = exp(phi) (t - R d).
@@ -36,12 +44,11 @@ void disturb_lenses(const SceneOptions& o, Problem& start) {
       const double other = std::clamp(1 + 10 * o.focal_noise * random.normal(), 0.5, 1.5);
       if (i == role.fx || i == role.fy) {
         k *= zoom;
-      } else if (i != role.cx && i != role.cy) {
+      } else if (i != role.cx && i != role.cy && image_size(lens.model) == 0) {
         k *= other;
       }
     }
-    // The domain of EUCM, and of what it sees, ends at alpha = 1.
-    if (lens.model == CameraModel::eucm) lens.parameters[4] = std::min(lens.parameters[4], 0.75);
+    keep_in_domain(lens);
   }
 }
 

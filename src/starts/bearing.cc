@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "geometry/camera_model.h"
 
@@ -38,9 +39,18 @@ Vector3<double> first_guess(const Camera& camera, const double* pixel) {
   return {k * x, k * y, forward * std::cos(angle)};
 }
 
+std::optional<Vector3<double>> in_panorama(const Camera& camera, const double* pixel) {
+  const double theta = 2 * std::numbers::pi * (pixel[0] / camera.parameters[0] - 0.5);
+  const double phi = std::numbers::pi * (pixel[1] / camera.parameters[1] - 0.5);
+  if (!(std::fabs(phi) <= std::numbers::pi / 2) || !std::isfinite(theta)) return std::nullopt;
+  const double flat = std::cos(phi);
+  return Vector3<double>{flat * std::sin(theta), std::sin(phi), flat * std::cos(theta)};
+}
+
 }  // namespace
 
 std::optional<Vector3<double>> bearing(const Camera& camera, const double* pixel) {
+  if (camera.model == CameraModel::equirectangular) return in_panorama(camera, pixel);
   constexpr int kSteps = 20;
   constexpr double kFarthest = 0.3;  // radians in one step
   constexpr double kNear_px = 0.5;
@@ -48,7 +58,7 @@ std::optional<Vector3<double>> bearing(const Camera& camera, const double* pixel
   if (!std::isfinite(d[0] + d[1] + d[2])) return std::nullopt;
   for (int i = 0; i < kSteps; ++i) {
     const LensJacobian<double> at = project_with_jacobian(camera, d);
-    const double r[2] = {at.pixel[0] - pixel[0], at.pixel[1] - pixel[1]};
+    const std::array<double, 2> r = residual(camera, at.pixel, pixel);
     const auto basis = across(d);
     double J[2][2];
     for (std::size_t row = 0; row < 2; ++row)
@@ -67,13 +77,14 @@ std::optional<Vector3<double>> bearing(const Camera& camera, const double* pixel
     if (length < 1e-9) break;
   }
   const Projected seen = project(camera, d);
-  const double x = seen.pixel[0] - pixel[0], y = seen.pixel[1] - pixel[1];
+  const auto [x, y] = residual(camera, seen.pixel, pixel);
   if (!seen.before || !(x * x + y * y < kNear_px * kNear_px)) return std::nullopt;
   return d;
 }
 
 Camera without_distortion(const Camera& camera) {
   Camera plain = camera;
+  if (image_size(camera.model) != 0) return plain;
   const ParameterRoles roles = roles_of(camera.model);
   for (std::size_t k = 0; k < parameter_count(camera.model); ++k) {
     const int i = static_cast<int>(k);

@@ -147,6 +147,8 @@ Result<void> check(const Board& board, const std::vector<BoardView>& views, cons
     return usage("a calibration needs the size of the images");
   if (lens.model == CameraModel::bal)
     return usage("a calibration needs a lens with a principal point, which BAL has not");
+  if (image_size(lens.model) != 0)
+    return usage("a calibration needs a lens, and EQUIRECTANGULAR has no parameter of one");
   for (const BoardView& view : views) {
     if (view.xy.size() != view.corners.size() || view.sigma.size() != view.corners.size())
       return usage("view " + view.image + ": as many corners, pixels and sigmas are needed");

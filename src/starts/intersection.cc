@@ -40,8 +40,8 @@ class PointBlock {
       const Matrix3<double>& R = views_.rotations[image];
       const Vector3<double> P = in_camera(R, views_.state.poses[image], X_.data());
       const LensJacobian<double> at = project_with_jacobian(views_.camera(image), P);
-      const double* pixel = views_.sights.pixel(i);
-      const std::array<double, 2> r = {at.pixel[0] - pixel[0], at.pixel[1] - pixel[1]};
+      const std::array<double, 2> r =
+          residual(views_.camera(image), at.pixel, views_.sights.pixel(i));
       const auto rho = evaluate_loss(views_.loss, r[0] * r[0] + r[1] * r[1]);
       std::array<std::array<double, kMost>, 2> J;
       for (std::size_t row = 0; row < 2; ++row)

@@ -39,6 +39,7 @@ class ImageBlock {
       : sights_(sights), points_(points), seen_(seen), loss_(loss), held_(std::move(start)) {
     const ParameterRoles roles = roles_of(held_.camera.model);
     for (int role : {roles.fx, roles.fy}) {
+      if (role < 0) continue;
       const auto k = static_cast<std::size_t>(role);
       focals_.push_back({k, std::fabs(held_.camera.parameters[k])});
     }
@@ -58,8 +59,7 @@ class ImageBlock {
       const Vector3<double> P =
           in_camera(R, held_.pose, &points_[3 * std::size_t(sights_.point(i))]);
       const LensJacobian<double> at = project_with_jacobian(held_.camera, P);
-      const double* pixel = sights_.pixel(i);
-      const std::array<double, 2> r = {at.pixel[0] - pixel[0], at.pixel[1] - pixel[1]};
+      const std::array<double, 2> r = residual(held_.camera, at.pixel, sights_.pixel(i));
       const auto rho = evaluate_loss(loss_, r[0] * r[0] + r[1] * r[1]);
       std::array<std::array<double, kMost>, 2> J;
       for (std::size_t row = 0; row < 2; ++row) {

@@ -46,7 +46,7 @@ Sights::Sights(const Problem& problem, const std::vector<std::uint8_t>& skip) : 
 Fit fit_of(const Camera& camera, const Vector3<double>& P, const double* pixel,
            const ScaledLoss& loss) {
   const Projected seen = project(camera, P);
-  const double x = seen.pixel[0] - pixel[0], y = seen.pixel[1] - pixel[1];
+  const auto [x, y] = residual(camera, seen.pixel, pixel);
   return {0.5 * evaluate_loss(loss, x * x + y * y).value, seen.before ? 0u : 1u};
 }
 

@@ -69,7 +69,7 @@ std::array<double, 2> mark_residual(const Problem& problem, const Sighting& sigh
                                     const Vector3<double>& X) {
   const Camera& camera = problem.cameras[problem.image_camera[sighting.image]];
   const Projected at = project(camera, in_camera_of(problem, sighting.image, X));
-  return {at.pixel[0] - sighting.pixel[0], at.pixel[1] - sighting.pixel[1]};
+  return residual(camera, at.pixel, sighting.pixel.data());
 }
 
 }  // namespace sheaf

@@ -36,8 +36,7 @@ bool is_apart(const Vector3<double>& a, const Vector3<double>& b, double tangent
 /// Of the angle under which so many pixels are seen; infinite where that is a right one or more.
 double tangent_of(const Camera& camera, double pixels) {
   constexpr double kRight = 1.5707963267948966;
-  const double f =
-      std::fabs(camera.parameters[static_cast<std::size_t>(roles_of(camera.model).fx)]);
+  const double f = std::fabs(pixels_per_radian(camera));
   return pixels < kRight * f ? std::tan(pixels / f) : std::numeric_limits<double>::infinity();
 }
 

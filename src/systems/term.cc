@@ -166,9 +166,10 @@ class KeptObservation : public Term {
     camera.model = sight_.model;
     camera.parameters = at.sets[sight_.lens];
     const LensJacobian<double> j = project_with_jacobian(camera, P);
+    const std::array<double, 2> e = residual(camera, j.pixel, sight_.xy.data());
     const std::size_t columns = places().size(), parameters = columns - 9;
     for (std::size_t row = 0; row < 2; ++row) {
-      r[row] = sight_.inverse_sigma * (j.pixel[row] - sight_.xy[row]);
+      r[row] = sight_.inverse_sigma * e[row];
       if (J == nullptr) continue;
       double* to = J + row * columns;
       const Vector3<double> a = j.point[row], turn = cross(P, a);

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 
+#include "geometry/camera_model.h"
 #include "sheaf/board.h"
 #include "sheaf/covariance.h"
 #include "sheaf/solve.h"
@@ -90,11 +91,14 @@ TEST(Calibration, StartsFromHomographiesThroughAnyLens) {
   for (const CameraModel model :
        {CameraModel::simple_pinhole, CameraModel::radial, CameraModel::full_opencv,
         CameraModel::opencv_fisheye, CameraModel::thin_prism_fisheye, CameraModel::fov,
-        CameraModel::eucm}) {
+        CameraModel::eucm, CameraModel::rad_tan_thin_prism_fisheye, CameraModel::division,
+        CameraModel::radial_k3, CameraModel::double_sphere, CameraModel::ucm}) {
     SCOPED_TRACE(to_string(model));
     const Problem p = calibrated(model);
     EXPECT_EQ(p.num_images(), 10u);
-    EXPECT_NEAR(p.cameras[0].parameters[0], 1400, 60);
+    // By the pixels near the axis: a double sphere's xi is a part of its focal length.
+    const auto at = project(p.cameras[0], {1e-3, 0, 1}).pixel;
+    EXPECT_NEAR((at[0] - project(p.cameras[0], {0, 0, 1}).pixel[0]) / 1e-3, 1400, 60);
     EXPECT_LT(evaluate(p).rms_px, 2.0);
   }
 }
@@ -120,6 +124,8 @@ TEST(Calibration, WhatMakesNoSenseIsRefused) {
   sizeless.width_px = 0;
   EXPECT_NE(words(kBoard, sizeless).find("size of the images"), std::string::npos);
   EXPECT_NE(words(kBoard, unknown_lens(CameraModel::bal)).find("BAL"), std::string::npos);
+  EXPECT_NE(words(kBoard, unknown_lens(CameraModel::equirectangular)).find("EQUIRECTANGULAR"),
+            std::string::npos);
   EXPECT_NE(words({6, 5, 0}, unknown_lens(CameraModel::opencv)).find("spacing"), std::string::npos);
   EXPECT_NE(words({5, 5, 1}, unknown_lens(CameraModel::opencv)).find("expected one below 25"),
             std::string::npos);

@@ -65,12 +65,12 @@ inline Eigen::VectorXd residuals(const Problem& p, const std::vector<double>& ro
   };
   for (std::size_t i = 0; i < p.num_observations(); ++i) {
     const std::uint32_t image = p.observation_image[i];
+    const Camera& camera = p.cameras[p.image_camera[image]];
     const Projected at =
-        project(p.cameras[p.image_camera[image]],
-                seen_from(pose_of(p, image), &p.points[3 * p.observation_point[i]]));
+        project(camera, seen_from(pose_of(p, image), &p.points[3 * p.observation_point[i]]));
+    const auto e = residual(camera, at.pixel, &p.observation_xy[2 * i]);
     const double sigma = p.observation_sigma.empty() ? 1 : p.observation_sigma[i];
-    add({(at.pixel[0] - p.observation_xy[2 * i]) / sigma,
-         (at.pixel[1] - p.observation_xy[2 * i + 1]) / sigma});
+    add({e[0] / sigma, e[1] / sigma});
   }
   const auto whitened = [](const Covariance3& C, const Vector3<double>& e) {
     const Eigen::Matrix3d U =

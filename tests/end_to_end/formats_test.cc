@@ -69,12 +69,13 @@ TEST_F(FormatsCommand, InfoBeginsWithWhatOneLooksFor) {
   EXPECT_NE(solved.out.find("8 images, 1 blocks of lenses, "), std::string::npos) << solved.out;
 }
 
-/// OpenMVG has one focal length; a FULL_OPENCV lens, which its third coefficient takes, has two.
+/// OpenMVG has one focal length; a FULL_OPENCV lens, which tangential and third coefficients take,
+/// has two. A RADIAL_K3 lens has one as well.
 TEST_F(FormatsCommand, WhatTheResultCannotBeWrittenAsIsSaidBeforeASolve) {
   Problem problem = read(folder_ / "model").value();
   for (Camera& camera : problem.cameras) {
     const double f = camera.parameters[0];
-    camera = {CameraModel::full_opencv, {f, f, 900, 600, 0.01, 0, 0, 0, 0.001}, 1800, 1200};
+    camera = {CameraModel::full_opencv, {f, f, 900, 600, 0.01, 0, 0.0005, 0, 0.001}, 1800, 1200};
   }
   write(problem, folder_ / "sfm_data.json").value();
   std::filesystem::create_directory(folder_ / "r");
@@ -86,6 +87,12 @@ TEST_F(FormatsCommand, WhatTheResultCannotBeWrittenAsIsSaidBeforeASolve) {
   EXPECT_NE(refused.err.find("--fix f"), std::string::npos) << refused.err;
   EXPECT_EQ(refused.err.find("iteration"), std::string::npos) << refused.err;
   EXPECT_EQ(run({"solve", "sfm_data.json", "-o", "r/sfm_data.json", "--fix", "f"}).exit_code, 0);
+  for (Camera& camera : problem.cameras)
+    camera = {CameraModel::radial_k3, {camera.parameters[0], 900, 600, 0.01, 0, 0.001}, 1800, 1200};
+  write(problem, folder_ / "sfm_data.json").value();
+  const Outcome kept = run({"solve", "sfm_data.json", "-o", "r/sfm_data.json"});
+  EXPECT_EQ(kept.exit_code, 0) << kept.err;
+  EXPECT_EQ(read(folder_ / "r/sfm_data.json").value().cameras[0].model, CameraModel::radial_k3);
 }
 
 TEST_F(FormatsCommand, SaysWhatAConversionDrops) {

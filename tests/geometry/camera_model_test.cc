@@ -15,6 +15,7 @@
 
 #include "geometry/dual.h"
 #include "geometry/lenses.h"
+#include "geometry/recorded_pixels.h"
 
 namespace sheaf {
 namespace {
@@ -23,34 +24,44 @@ using test::Dual;
 using test::ordinary;
 using Real = long double;
 
-constexpr std::array<CameraModel, kCameraModels> kAll{CameraModel::bal,
-                                                      CameraModel::simple_pinhole,
-                                                      CameraModel::pinhole,
-                                                      CameraModel::simple_radial,
-                                                      CameraModel::radial,
-                                                      CameraModel::opencv,
-                                                      CameraModel::full_opencv,
-                                                      CameraModel::opencv_fisheye,
-                                                      CameraModel::simple_radial_fisheye,
-                                                      CameraModel::radial_fisheye,
-                                                      CameraModel::thin_prism_fisheye,
-                                                      CameraModel::fov,
-                                                      CameraModel::eucm};
+std::vector<CameraModel> every_model() {
+  std::vector<CameraModel> out;
+  for (std::size_t m = 0; m < kCameraModels; ++m) out.push_back(static_cast<CameraModel>(m));
+  return out;
+}
+
+const std::vector<CameraModel> kAll = every_model();
 
 bool is_fisheye(CameraModel model) {
   return model == CameraModel::opencv_fisheye || model == CameraModel::simple_radial_fisheye ||
-         model == CameraModel::radial_fisheye || model == CameraModel::thin_prism_fisheye;
+         model == CameraModel::radial_fisheye || model == CameraModel::thin_prism_fisheye ||
+         model == CameraModel::rad_tan_thin_prism_fisheye || model == CameraModel::simple_fisheye ||
+         model == CameraModel::fisheye;
+}
+
+/// Whether the model sees behind its image plane, with its ordinary parameters.
+bool is_wide(CameraModel model) {
+  return is_fisheye(model) || model == CameraModel::fov || model == CameraModel::eucm ||
+         model == CameraModel::simple_division || model == CameraModel::division ||
+         model == CameraModel::equirectangular || model == CameraModel::double_sphere ||
+         model == CameraModel::ucm;
 }
 
 /// The published formulas once more, in the form "u plus what distortion adds to it", in long
 /// double and with the angle by acos.
 std::array<Real, 2> published(const Camera& camera, const std::array<double, 3>& P) {
-  std::array<Real, 12> k;
-  for (std::size_t i = 0; i < 12; ++i) k[i] = camera.parameters[i];
+  std::array<Real, kMaxCameraParameters> k;
+  for (std::size_t i = 0; i < k.size(); ++i) k[i] = camera.parameters[i];
   const Real X = P[0], Y = P[1], Z = P[2], r = std::sqrt(X * X + Y * Y);
   if (camera.model == CameraModel::bal) {
     const Real x = -X / Z, y = -Y / Z, n = x * x + y * y;
     return {k[0] * (1 + k[1] * n + k[2] * n * n) * x, k[0] * (1 + k[1] * n + k[2] * n * n) * y};
+  }
+  if (camera.model == CameraModel::equirectangular) {
+    constexpr Real kPi = std::numbers::pi_v<Real>;
+    const Real flat = std::sqrt(X * X + Z * Z), turn = std::acos(Z / flat);
+    const Real rise = std::asin(Y / std::sqrt(X * X + Y * Y + Z * Z));
+    return {k[0] * ((X < 0 ? -turn : turn) / (2 * kPi) + 0.5L), k[1] * (rise / kPi + 0.5L)};
   }
   Real u = X / Z, v = Y / Z;
   if (is_fisheye(camera.model)) {
@@ -101,6 +112,36 @@ std::array<Real, 2> published(const Camera& camera, const std::array<double, 3>&
       du = X / h - u, dv = Y / h - v;
       break;
     }
+    case CameraModel::ucm: {  // as MEI's model states it, with xi
+      const Real xi = k[4] / (1 - k[4]), h = (Z + xi * std::sqrt(r * r + Z * Z)) / (1 + xi);
+      du = X / h - u, dv = Y / h - v;
+      break;
+    }
+    case CameraModel::double_sphere: {
+      const Real d1 = std::sqrt(r * r + Z * Z), e = k[4] * d1 + Z;
+      const Real h = k[5] * std::sqrt(r * r + e * e) + (1 - k[5]) * e;
+      du = X / h - u, dv = Y / h - v;
+      break;
+    }
+    case CameraModel::radial_k3:
+      radial(k[3] * n + k[4] * n * n + k[5] * n * n * n);
+      break;
+    case CameraModel::simple_division:
+    case CameraModel::division: {
+      // The distorted radius s has s / (1 + l s^2) = r / Z.
+      const Real l = k[camera.model == CameraModel::division ? 4 : 3];
+      const Real s = (Z - std::sqrt(Z * Z - 4 * l * r * r)) / (2 * l * r);
+      du = s * X / r - u, dv = s * Y / r - v;
+      break;
+    }
+    case CameraModel::rad_tan_thin_prism_fisheye: {
+      Real factor = 1, power = 1;
+      for (std::size_t i = 4; i < 10; ++i) factor += k[i] * (power *= n);
+      const Real x = factor * u, y = factor * v, q = x * x + y * y;
+      du = x + 2 * k[11] * x * y + k[10] * (q + 2 * x * x) + k[12] * q + k[13] * q * q - u;
+      dv = y + 2 * k[10] * x * y + k[11] * (q + 2 * y * y) + k[14] * q + k[15] * q * q - v;
+      break;
+    }
     default:
       break;
   }
@@ -140,56 +181,8 @@ TEST(CameraModels, AreThePublishedFormulas) {
   }
 }
 
-struct Recorded {
-  CameraModel model;
-  std::array<double, 3> P;
-  std::array<double, 2> pixel;
-};
-
-/// By COLMAP 4.2.1 with the parameters of `ordinary`.
-const Recorded kRecorded[] = {
-    {CameraModel::simple_pinhole, {0.3, -0.2, 1}, {470, 140}},
-    {CameraModel::simple_pinhole, {-1.1, 0.7, 1.6}, {-23.75, 458.75}},
-    {CameraModel::simple_pinhole, {0.02, 0.5, 0.4}, {345, 865}},
-    {CameraModel::pinhole, {0.3, -0.2, 1}, {470, 138}},
-    {CameraModel::pinhole, {-1.1, 0.7, 1.6}, {-23.75, 463.125}},
-    {CameraModel::pinhole, {0.02, 0.5, 0.4}, {345, 877.5}},
-    {CameraModel::simple_radial, {0.3, -0.2, 1}, {469.02499999999998, 140.64999999999998}},
-    {CameraModel::simple_radial, {-1.1, 0.7, 1.6}, {-12.33642578125, 451.48681640625}},
-    {CameraModel::simple_radial, {0.02, 0.5, 0.4}, {343.04374999999999, 816.09375}},
-    {CameraModel::radial, {0.3, -0.2, 1}, {469.05034999999998, 140.63310000000001}},
-    {CameraModel::radial, {-1.1, 0.7, 1.6}, {-13.852291107177734, 452.45145797729492}},
-    {CameraModel::radial, {0.02, 0.5, 0.4}, {343.65605625000001, 831.40140625000004}},
-    {CameraModel::opencv, {0.3, -0.2, 1}, {468.46535, 139.04356200000001}},
-    {CameraModel::opencv, {-1.1, 0.7, 1.6}, {-16.867916107177734, 458.6886902618408}},
-    {CameraModel::opencv, {0.02, 0.5, 0.4}, {341.42605624999999, 847.82198437500006}},
-    {CameraModel::full_opencv, {0.3, -0.2, 1}, {467.93437920052668, 139.40462214364186}},
-    {CameraModel::full_opencv, {-1.1, 0.7, 1.6}, {-12.645637537287257, 455.94804762647556}},
-    {CameraModel::full_opencv, {0.02, 0.5, 0.4}, {340.96739046485175, 836.12600685371979}},
-    {CameraModel::opencv_fisheye, {0.3, -0.2, 1}, {406.67674928017152, 180.28935049588185}},
-    {CameraModel::opencv_fisheye, {-1.1, 0.7, 1.6}, {144.86014821612471, 355.16772071848766}},
-    {CameraModel::opencv_fisheye, {0.02, 0.5, 0.4}, {330.94783170221854, 522.818985640645}},
-    {CameraModel::simple_radial_fisheye, {0.3, -0.2, 1}, {406.17166124720853, 182.55222583519429}},
-    {CameraModel::simple_radial_fisheye, {-1.1, 0.7, 1.6}, {148.55943155427082, 349.0985435563731}},
-    {CameraModel::simple_radial_fisheye,
-     {0.02, 0.5, 0.4},
-     {330.57599091120818, 504.39977278020507}},
-    {CameraModel::radial_fisheye, {0.3, -0.2, 1}, {406.57797732075647, 182.28134845282901}},
-    {CameraModel::radial_fisheye, {-1.1, 0.7, 1.6}, {145.55000040050786, 351.01363610876774}},
-    {CameraModel::radial_fisheye, {0.02, 0.5, 0.4}, {330.87985577238328, 511.99639430958132}},
-    {CameraModel::thin_prism_fisheye, {0.3, -0.2, 1}, {406.38935293206464, 180.43783860907038}},
-    {CameraModel::thin_prism_fisheye, {-1.1, 0.7, 1.6}, {143.72652868741631, 355.72870012524641}},
-    {CameraModel::thin_prism_fisheye, {0.02, 0.5, 0.4}, {330.50186436400793, 523.75418197307567}},
-    {CameraModel::fov, {0.3, -0.2, 1}, {412.96542629242282, 175.95715077633093}},
-    {CameraModel::fov, {-1.1, 0.7, 1.6}, {132.44316847124421, 363.33282558103031}},
-    {CameraModel::fov, {0.02, 0.5, 0.4}, {331.71821795516075, 542.72063050832003}},
-    {CameraModel::eucm, {0.3, -0.2, 1}, {406.13077661609429, 180.66546499780168}},
-    {CameraModel::eucm, {-1.1, 0.7, 1.6}, {148.8463179835598, 352.546512113841}},
-    {CameraModel::eucm, {0.02, 0.5, 0.4}, {330.54627591392523, 512.44546110973533}},
-};
-
 TEST(CameraModels, AgreeWithAnotherImplementation) {
-  for (const Recorded& record : kRecorded) {
+  for (const test::RecordedPixel& record : test::kRecordedPixels) {
     const auto u = project(ordinary(record.model), record.P).pixel;
     for (std::size_t r = 0; r < 2; ++r)
       EXPECT_NEAR(u[r], record.pixel[r], 1e-10) << to_string(record.model);
@@ -240,6 +233,17 @@ TEST(CameraModels, JacobiansMatchAutomaticDifferentiation) {
                             seen_point(CameraModel::fov, 1.0, random), 1e-7);
 }
 
+bool all_finite(const LensJacobian<double>& J, std::size_t parameters) {
+  bool finite = true;
+  for (std::size_t r = 0; r < 2; ++r) {
+    finite = finite && std::isfinite(J.pixel[r]);
+    for (double x : J.point[r]) finite = finite && std::isfinite(x);
+    for (std::size_t i = 0; i < parameters; ++i)
+      finite = finite && std::isfinite(J.parameters[r][i]);
+  }
+  return finite;
+}
+
 TEST(CameraModels, JacobiansMatchCentralDifferences) {
   std::mt19937 random(13);
   for (CameraModel model : kAll) {
@@ -264,6 +268,64 @@ TEST(CameraModels, JacobiansMatchCentralDifferences) {
   }
 }
 
+/// Parameters of the division models and of unified ones on both sides of where they turn into
+/// others, and without distortion.
+TEST(CameraModels, JacobiansAreExactWithoutDistortionAndWithTheOtherSign) {
+  std::mt19937 random(17);
+  for (int i = 0; i < 50; ++i) {
+    for (double k : {-0.3, -1e-9, 0.0, 1e-9, 0.02})
+      expect_exact_jacobian({CameraModel::division, {300, 310, 320, 240, k}},
+                            seen_point(CameraModel::division, 1.1, random), 1e-9);
+    for (double alpha : {0.0, 0.3, 0.5, 0.8}) {
+      expect_exact_jacobian({CameraModel::ucm, {300, 310, 320, 240, alpha}},
+                            seen_point(CameraModel::ucm, 1.1, random), 1e-10);
+      for (double xi : {-0.4, 0.0, 0.3})
+        expect_exact_jacobian({CameraModel::double_sphere, {300, 310, 320, 240, xi, alpha}},
+                              seen_point(CameraModel::double_sphere, 1.0, random), 1e-10);
+    }
+  }
+}
+
+/// With k >= 0 pixels end where Z = 2 sqrt(k) r: beyond is not seen, and finite.
+TEST(CameraModels, DivisionSeesUpToWhereItsPixelsEnd) {
+  const Camera lens{CameraModel::simple_division, {500, 0, 0, 0.25}};  // Z = r
+  EXPECT_TRUE(sees(lens, {0.999, 0, 1}));
+  EXPECT_NEAR(project(lens, {1 - 1e-12, 0, 1}).pixel[0], 1000, 1e-2);
+  for (const std::array<double, 3>& P :
+       {std::array{1.001, 0.0, 1.0}, {0.1, 0.0, -1.0}, {1.0, 0.0, 0.0}, {0.0, 0.0, -1.0}}) {
+    EXPECT_FALSE(sees(lens, P));
+    EXPECT_TRUE(all_finite(project_with_jacobian(lens, P), 4));
+    EXPECT_FALSE(sees({CameraModel::simple_division, {500, 0, 0, 0}}, P) && P[2] <= 0);
+  }
+  // The formula is the perspective one, behind the camera too, as k vanishes from above.
+  const Camera plain{CameraModel::simple_division, {500, 0, 0, 0}};
+  EXPECT_DOUBLE_EQ(project(plain, {0.3, 0.1, -2}).pixel[0], -75);
+  // From below the rays go on behind the plane, to all directions but one.
+  const Camera wide{CameraModel::simple_division, {500, 0, 0, -0.25}};
+  EXPECT_TRUE(sees(wide, {0.001, 0, -1}));
+  EXPECT_FALSE(sees(wide, {0, 0, -1}));
+  EXPECT_NEAR(project(wide, {1, 0, 0}).pixel[0], 1000, 1e-9);
+}
+
+TEST(CameraModels, PanoramasJoinAtTheirBorders) {
+  const Camera panorama = ordinary(CameraModel::equirectangular);
+  const std::array<double, 2> left = project(panorama, {-1e-3, 0.1, -1}).pixel;
+  const std::array<double, 2> right = project(panorama, {1e-3, 0.1, -1}).pixel;
+  EXPECT_LT(left[0], 1);
+  EXPECT_GT(right[0], 639);
+  const auto e = residual(panorama, left, right.data());
+  EXPECT_NEAR(e[0], 640e-3 / std::numbers::pi, 1e-6);
+  EXPECT_EQ(e[1], 0);
+  const double far[2] = {right[0] - 3 * 640, right[1]};
+  EXPECT_NEAR(residual(panorama, right, far)[0], 0, 1e-12);
+  const Camera pinhole = ordinary(CameraModel::pinhole);
+  EXPECT_EQ(residual(pinhole, {1000, 0}, far)[0], 1000 - far[0]);
+  // There is no behind.
+  EXPECT_TRUE(sees(panorama, {0, 0, -1}));
+  EXPECT_TRUE(sees(panorama, {0, 1, 0}));
+  EXPECT_FALSE(sees(panorama, {0, 0, 0}));
+}
+
 TEST(CameraModels, FovIsContinuousWhereItsSeriesBegins) {
   std::mt19937 random(14);
   for (int i = 0; i < 50; ++i) {
@@ -273,17 +335,6 @@ TEST(CameraModels, FovIsContinuousWhereItsSeriesBegins) {
     for (std::size_t r = 0; r < 2; ++r)
       EXPECT_NEAR(below[r], above[r], 1e-10 * (1 + std::abs(above[r])));
   }
-}
-
-bool all_finite(const LensJacobian<double>& J, std::size_t parameters) {
-  bool finite = true;
-  for (std::size_t r = 0; r < 2; ++r) {
-    finite = finite && std::isfinite(J.pixel[r]);
-    for (double x : J.point[r]) finite = finite && std::isfinite(x);
-    for (std::size_t i = 0; i < parameters; ++i)
-      finite = finite && std::isfinite(J.parameters[r][i]);
-  }
-  return finite;
 }
 
 /// All around, the axis and exactly 90 degrees included, no model but BAL's (whose formula is
@@ -313,22 +364,24 @@ TEST(CameraModels, WideLensesSeeBehindTheirImagePlane) {
   std::mt19937 random(15);
   for (CameraModel model : kAll) {
     const Camera camera = ordinary(model);
-    const bool wide = is_fisheye(model) || model == CameraModel::fov || model == CameraModel::eucm;
-    EXPECT_EQ(project(camera, {1, 0.2, -0.1}).before, wide || model == CameraModel::bal)
+    EXPECT_EQ(project(camera, {1, 0.2, -0.1}).before, is_wide(model) || model == CameraModel::bal)
         << to_string(model);
-    if (!wide) continue;
+    if (!is_wide(model)) continue;
+    // Division models stretch their borders far.
+    const bool stretches = parameter_names(model).back() == "k" && !is_fisheye(model);
     double last = 0;
     for (int degrees = 80; degrees <= 100; ++degrees) {
       const double theta = degrees * std::numbers::pi / 180;
       const std::array<double, 3> P{std::sin(theta), 0, std::cos(theta)};
       const double x = project(camera, P).pixel[0];
       if (degrees > 80) {
-        EXPECT_LT(std::abs(x - last), 25) << to_string(model);  // px a degree
+        EXPECT_LT(std::abs(x - last), stretches ? 100 : 25) << to_string(model);  // px a degree
       }
       last = x;
       expect_exact_jacobian(camera, P, 1e-10);
     }
-    EXPECT_FALSE(project(camera, {0, 0, -1}).before) << to_string(model);
+    EXPECT_EQ(project(camera, {0, 0, -1}).before, model == CameraModel::equirectangular)
+        << to_string(model);
   }
   // 200 degrees in all: 100 from the axis.
   const double theta = 100 * std::numbers::pi / 180;
@@ -359,8 +412,8 @@ TEST(CameraModels, HaveNamesThatLeadBack) {
   for (CameraModel model : kAll) {
     EXPECT_EQ(camera_model_named(to_string(model)), model);
     EXPECT_EQ(parameter_names(model).size(), parameter_count(model));
-    if (model != CameraModel::bal) {
-      EXPECT_EQ(camera_model_of_colmap(colmap_id(model)), model);
+    if (const int id = colmap_id(model); id >= 0) {
+      EXPECT_EQ(camera_model_of_colmap(id), model);
     }
   }
   EXPECT_FALSE(camera_model_named("NO_SUCH_CAMERA").has_value());
@@ -372,8 +425,8 @@ TEST(CameraModels, WorkInFloat) {
   std::mt19937 random(16);
   for (CameraModel model : kAll) {
     const Camera camera = ordinary(model);
-    std::array<float, 12> k;
-    for (std::size_t i = 0; i < 12; ++i) k[i] = static_cast<float>(camera.parameters[i]);
+    std::array<float, kMaxCameraParameters> k;
+    for (std::size_t i = 0; i < k.size(); ++i) k[i] = static_cast<float>(camera.parameters[i]);
     for (int i = 0; i < 50; ++i) {
       const auto P = seen_point(model, 1.0, random);
       const std::array<float, 3> X{static_cast<float>(P[0]), static_cast<float>(P[1]),

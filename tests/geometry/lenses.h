@@ -36,6 +36,26 @@ inline Camera ordinary(CameraModel model) {
       return {model, {300, 310, 320, 240, 0.9}};
     case CameraModel::eucm:
       return {model, {300, 310, 320, 240, 0.65, 1.1}};
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      return {model,
+              {300, 310, 320, 240, 0.03, -0.01, 0.002, -0.0004, 0.00006, -0.000007, -0.003, 0.002,
+               0.001, -0.0003, -0.002, 0.0004}};
+    case CameraModel::simple_division:
+      return {model, {500, 320, 240, -0.08}};
+    case CameraModel::division:
+      return {model, {500, 510, 320, 240, -0.06}};
+    case CameraModel::simple_fisheye:
+      return {model, {300, 320, 240}};
+    case CameraModel::fisheye:
+      return {model, {300, 310, 320, 240}};
+    case CameraModel::equirectangular:
+      return {model, {640, 480}, 640, 480};
+    case CameraModel::radial_k3:
+      return {model, {500, 320, 240, -0.05, 0.01, 0.004}};
+    case CameraModel::double_sphere:
+      return {model, {300, 310, 320, 240, -0.2, 0.6}};
+    case CameraModel::ucm:
+      return {model, {300, 310, 320, 240, 0.62}};
   }
   return {};
 }

@@ -20,7 +20,13 @@ std::array<double, 2> offset_at(double px, double angle) {
 }
 
 bool is_fisheye(CameraModel model) {
-  return model >= CameraModel::opencv_fisheye && model <= CameraModel::thin_prism_fisheye;
+  return (model >= CameraModel::opencv_fisheye && model <= CameraModel::thin_prism_fisheye) ||
+         model == CameraModel::rad_tan_thin_prism_fisheye || model == CameraModel::simple_fisheye ||
+         model == CameraModel::fisheye;
+}
+
+bool is_division(CameraModel model) {
+  return model == CameraModel::simple_division || model == CameraModel::division;
 }
 
 TEST(LensCourse, OrdinaryLensesAreSoundAllRound) {
@@ -56,7 +62,7 @@ TEST(LensCourse, FoldsForEveryModelWithACoefficient) {
   for (std::size_t m = 0; m < kCameraModels; ++m) {
     Camera camera = test::ordinary(static_cast<CameraModel>(m));
     const ParameterRoles roles = roles_of(camera.model);
-    if (roles.k1 < 0) continue;
+    if (roles.k1 < 0 || is_division(camera.model)) continue;
     const double f = camera.parameters[0], edge = 0.3;
     for (std::size_t i = 0; i < parameter_count(camera.model); ++i)
       if (int(i) != roles.fx && int(i) != roles.fy && int(i) != roles.cx && int(i) != roles.cy)
@@ -94,6 +100,13 @@ TEST(LensCourse, EndsWhereNoRayGoesFartherOut) {
   EXPECT_EQ(course_of(eucm, {330 / 0.9, 0}), LensCourse::sound);  // f / sqrt(0.8) is the farthest
   EXPECT_EQ(course_of(eucm, {340 / 0.9, 0}), LensCourse::ends);
   EXPECT_FALSE(absurd_distortion(eucm, {340 / 0.9, 0}));
+  const Camera ucm{CameraModel::ucm, {300, 300, 320, 240, 0.9}};
+  EXPECT_EQ(course_of(ucm, {330 / 0.9, 0}), LensCourse::sound);
+  EXPECT_EQ(course_of(ucm, {340 / 0.9, 0}), LensCourse::ends);
+  // Pixels of a division lens end at f / sqrt(k), where Z = 2 sqrt(k) r.
+  const Camera division{CameraModel::division, {300, 300, 320, 240, 0.25}};
+  EXPECT_EQ(course_of(division, {590 / 0.9, 0}), LensCourse::sound);
+  EXPECT_EQ(course_of(division, {610 / 0.9, 0}), LensCourse::ends);
   EXPECT_TRUE(absurd_distortion({CameraModel::eucm, {300, 300, 320, 240, 0.9, 1e9}}, {300, 0}));
 }
 
@@ -101,6 +114,9 @@ TEST(LensCourse, EndsWhereNoRayGoesFartherOut) {
 TEST(LensCourse, NearlyFlatWideModelsReachFar) {
   for (const Camera& camera : {Camera{CameraModel::eucm, {300, 300, 320, 240, 0, 1}},
                                Camera{CameraModel::eucm, {300, 300, 320, 240, 0.3, 1}},
+                               Camera{CameraModel::ucm, {300, 300, 320, 240, 0.3}},
+                               Camera{CameraModel::double_sphere, {300, 300, 320, 240, 0, 0}},
+                               Camera{CameraModel::simple_division, {300, 320, 240, 0}},
                                Camera{CameraModel::fov, {300, 300, 320, 240, 0}},
                                Camera{CameraModel::fov, {300, 300, 320, 240, 0.01}}})
     for (const double px : {30, 300, 1500})
@@ -112,13 +128,22 @@ TEST(LensCourse, ParametersOutsideTheModel) {
   EXPECT_TRUE(outside_model({CameraModel::eucm, {300, 300, 320, 240, 1.1, 1}}));
   EXPECT_TRUE(outside_model({CameraModel::eucm, {300, 300, 320, 240, -0.1, 1}}));
   EXPECT_TRUE(outside_model({CameraModel::eucm, {300, 300, 320, 240, 0.5, 0}}));
+  EXPECT_TRUE(outside_model({CameraModel::ucm, {300, 300, 320, 240, 1.1}}));
+  EXPECT_TRUE(outside_model({CameraModel::double_sphere, {300, 300, 320, 240, 1, 0.5}}));
+  EXPECT_TRUE(outside_model({CameraModel::double_sphere, {300, 300, 320, 240, 0.2, -0.1}}));
+  EXPECT_TRUE(outside_model({CameraModel::equirectangular, {640, 0}}));
 }
 
 TEST(LensCourse, FocalLengthsByTheAnglesThatTheyMean) {
   const auto deg = [](double angle) { return angle * kPi / 180; };
   for (std::size_t m = 0; m < kCameraModels; ++m) {
     Camera camera = test::ordinary(static_cast<CameraModel>(m));
-    const bool two = roles_of(camera.model).fy != 0;
+    const ParameterRoles roles = roles_of(camera.model);
+    if (roles.fx < 0) {
+      EXPECT_FALSE(absurd_focal(camera, 320));
+      continue;
+    }
+    const bool two = roles.fy != roles.fx;
     const auto absurd = [&](double f) {
       camera.parameters[0] = f;
       if (two) camera.parameters[1] = f;

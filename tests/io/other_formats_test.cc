@@ -282,6 +282,11 @@ TEST(Libmv, HoldsOneLensOfItsFormulaAndRefusesOthers) {
     EXPECT_EQ(again.cameras[0].model == CameraModel::radial, camera.parameters[6] == 0)
         << to_string(camera.model);
   }
+  const Camera k3{CameraModel::radial_k3, {500, 320, 240, 0.01, 0.02, 3e-3}};
+  const Problem cubic =
+      parse_libmv(format_libmv(seen_by({k3}, 3, 6, 5)).value(), "f", notes).value();
+  EXPECT_EQ(cubic.cameras[0].model, CameraModel::radial_k3);
+  EXPECT_LT(evaluate(cubic).rms_px, 1e-3);
   const auto complaint = [](const Problem& problem) {
     const Result<std::string> refused = format_libmv(problem);
     EXPECT_FALSE(refused.ok());

@@ -5,10 +5,13 @@
 // own formulas, written down once more; their residuals are then 0.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
 #include "io/alicevision.h"
+#include "io/models.h"
 #include "io/openmvg.h"
 #include "io/opensfm.h"
 #include "io/view_scene.h"
@@ -24,9 +27,16 @@ struct Opensfm {
   std::string reconstruction, tracks;
 };
 
-Opensfm opensfm_of(const Scene& scene, const Stated& lens) {
+/// As OpenSfM and OpenMVG have it, in units of the larger side and from the middle.
+Vec2 sphere(const Vec3& P) {
+  const double longitude = std::atan2(P[0], P[2]);
+  const double latitude = std::atan2(-P[1], std::hypot(P[0], P[2]));
+  return {longitude / (2 * std::numbers::pi), -latitude / (2 * std::numbers::pi)};
+}
+
+Opensfm opensfm_of(const Scene& scene, const Stated& lens, const std::string& height = "480") {
   Opensfm out{"[{\"cameras\": {\"v2 a\": {" + lens.members +
-                  ", \"width\": 640, \"height\": 480}}, \"shots\": {",
+                  ", \"width\": 640, \"height\": " + height + "}}, \"shots\": {",
               "OPENSFM_TRACKS_VERSION_v2\n"};
   for (std::size_t j = 0; j < 2; ++j) {
     const std::string name = j == 0 ? "a b.jpg" : "c.jpg";
@@ -86,13 +96,15 @@ std::vector<Stated> opensfm_lenses() {
            [=](const Vec3& P) {
              return affine(0.6, 0.61, 0.01, 0.02, radial(bent(P), {-0.03, 0.01, 0.002, -0.001}));
            },
-           CameraModel::opencv_fisheye}};
+           CameraModel::opencv_fisheye},
+          {"\"projection_type\": \"spherical\"", sphere, CameraModel::equirectangular}};
 }
 
 TEST(OpenSfm, ReadsItsLensesAndWritesThemBack) {
   for (const Stated& lens : opensfm_lenses()) {
     SCOPED_TRACE(lens.members);
-    const Opensfm files = opensfm_of(Scene(), lens);
+    const bool whole = lens.model == CameraModel::equirectangular;
+    const Opensfm files = opensfm_of(Scene(), lens, whole ? "320" : "480");
     Notes notes;
     const Problem p =
         parsed("opensfm", files.reconstruction, notes, holding("tracks.csv", files.tracks));
@@ -128,7 +140,9 @@ TEST(OpenSfm, ReadsItsLensesAndWritesThemBack) {
 TEST(OpenSfm, WhatThereIsNoModelOfIsRefusedByName) {
   Notes notes;
   for (const auto& [what, message] :
-       {std::pair{"\"projection_type\": \"spherical\"", "f:1: found no \"focal_x\""},
+       {std::pair{"\"projection_type\": \"brown\"", "f:1: found no \"focal_x\""},
+        {"\"projection_type\": \"spherical\"",
+         "f:1: found a spherical lens whose images are not twice as wide as high"},
         {"\"projection_type\": \"fisheye62\", \"focal_x\": 1, \"focal_y\": 1",
          "f:1: found 'fisheye62', expected a lens that Sheaf has a model of"}}) {
     const Opensfm files = opensfm_of(Scene(), {what, straight, CameraModel::bal});
@@ -221,7 +235,7 @@ TEST(AliceVision, ReadsItsLensesAndWritesThemBack) {
             [](const Vec3& P) {
               return pixel(radial(straight(P), {-0.1, 0.02, 0.003}));
             },
-            CameraModel::full_opencv},
+            CameraModel::radial_k3},
            {"\"type\": \"brown\", \"distortionParams\": [\"-0.1\", \"0.02\", \"0.003\", \"0.001\", "
             "\"-0.002\"]",
             [](const Vec3& P) {
@@ -265,13 +279,13 @@ TEST(AliceVision, ReadsItsLensesAndWritesThemBack) {
 TEST(AliceVision, CoefficientsThatItsLensHasNotAreHeld) {
   Notes notes;
   const Stated lens{
-      "\"principalPoint\": [\"10\", \"-20\"], \"focalLength\": \"25\", \"type\": \"radial3\", "
-      "\"distortionParams\": [\"-0.1\", \"0.02\", \"0.003\"]",
+      "\"principalPoint\": [\"10\", \"-20\"], \"focalLength\": \"25\", \"type\": \"brown\", "
+      "\"distortionParams\": [\"-0.1\", \"0.02\", \"0.003\", \"0.001\", \"-0.002\"]",
       straight, CameraModel::full_opencv};
   const Problem p =
       parsed("alicevision", alicevision_of(Scene(), lens, "[\"1\", \"2\", \"6\"]"), notes);
   // fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
-  EXPECT_EQ(held_parameters(p, {})[0], 0b111011001100);
+  EXPECT_EQ(held_parameters(p, {})[0], 0b111000001100);
   Fixed asked;
   asked.parameters = {0b1100};
   EXPECT_EQ(held_parameters(p, asked)[0], 0b1100);
@@ -353,6 +367,28 @@ std::string openmvg_lens(const std::string& type, const std::string& coefficient
          coefficients + "}}}}";
 }
 
+std::string openmvg_sphere(int width, int height) {
+  return "{\"key\": 5, \"value\": {\"polymorphic_id\": 2147483649, \"polymorphic_name\": "
+         "\"spherical\", \"ptr_wrapper\": {\"id\": 2147483654, \"data\": {\"value0\": "
+         "{\"width\": " +
+         std::to_string(width) + ", \"height\": " + std::to_string(height) + "}}}}}";
+}
+
+/// Both scale the two angles alike, by the larger side; w and h of EQUIRECTANGULAR may differ.
+TEST(OpenMvg, OfPanoramasItHasWholeOnes) {
+  Notes notes;
+  const Stated narrow{openmvg_sphere(640, 480), sphere, CameraModel::equirectangular};
+  const std::string text = openmvg_of(Scene(), narrow);
+  const JsonValue root = parse_json(text, "f").value();
+  const Result<Problem> refused = parse_openmvg({text, "f", &root, {}, notes});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(std::string(refused.error().what()).find("twice as wide as high"), std::string::npos);
+  const Problem other =
+      test::seen_by({{CameraModel::equirectangular, {640, 480}, 640, 480}}, 2, 5, 1);
+  EXPECT_FALSE(format_openmvg(other).ok());
+  EXPECT_FALSE(format_opensfm(other).ok());
+}
+
 TEST(OpenMvg, ReadsItsLensesAndWritesThemBack) {
   for (const Stated& lens : std::vector<Stated>{
            {openmvg_lens("pinhole", ""), [](const Vec3& P) { return pixel(straight(P)); },
@@ -369,7 +405,7 @@ TEST(OpenMvg, ReadsItsLensesAndWritesThemBack) {
             [](const Vec3& P) {
               return pixel(radial(straight(P), {-0.1, 0.02, 0.003}));
             },
-            CameraModel::full_opencv},
+            CameraModel::radial_k3},
            {openmvg_lens("pinhole_brown_t2", ", \"disto_t2\": [-0.1, 0.02, 0.003, 0.001, -0.002]"),
             [](const Vec3& P) {
               return pixel(brown(straight(P), {-0.1, 0.02, 0.003}, 0.001, -0.002));
@@ -379,7 +415,12 @@ TEST(OpenMvg, ReadsItsLensesAndWritesThemBack) {
             [](const Vec3& P) {
               return pixel(radial(bent(P), {-0.03, 0.01, 0.002, -0.001}));
             },
-            CameraModel::opencv_fisheye}}) {
+            CameraModel::opencv_fisheye},
+           {openmvg_sphere(640, 320),
+            [](const Vec3& P) {
+              return Vec2{640 * sphere(P)[0] + 320, 640 * sphere(P)[1] + 160};
+            },
+            CameraModel::equirectangular}}) {
     SCOPED_TRACE(lens.members);
     Notes notes;
     const Problem p = parsed("openmvg", openmvg_of(Scene(), lens), notes);

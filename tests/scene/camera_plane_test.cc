@@ -32,7 +32,7 @@ TEST(CameraPlane, ListsWhatHasNoPixelForEveryModel) {
     const PlaneSights found = plane_sights(seen_from_origin(
         model, {{0.1, 0.2, ahead}, {0, 0, 0}, {1, 2, 0}, {1, 2, -ahead}, {1e6, 0, 1e-3 * ahead}}));
     EXPECT_EQ(found.at_centre, (Numbers{1})) << to_string(model);
-    const bool plane = model <= CameraModel::full_opencv;
+    const bool plane = model <= CameraModel::full_opencv || model == CameraModel::radial_k3;
     EXPECT_EQ(found.in_plane, plane ? (Numbers{2}) : Numbers()) << to_string(model);
   }
 }
@@ -45,6 +45,8 @@ TEST(CameraPlane, KnowsWhereAWideModelIsAPlanesOwn) {
   Problem eucm = seen_from_origin(CameraModel::eucm, {{1, 2, 0}});
   eucm.cameras[0].parameters[4] = 0;
   EXPECT_EQ(plane_sights(eucm).in_plane, (Numbers{0}));
+  Problem division = seen_from_origin(CameraModel::simple_division, {{1, 2, 0}});
+  EXPECT_EQ(plane_sights(division).in_plane, Numbers());
 }
 
 /// What is 0 is so up to the rounding of poses far from the origin, and no further.

@@ -15,6 +15,7 @@
 #include "solve/lens_problems.h"
 #include "solve/scenes.h"
 #include "solve/textbook.h"
+#include "starts/bearing.h"
 
 namespace sheaf {
 namespace {
@@ -164,12 +165,13 @@ TEST(LensModels, WhatIsHeldStaysBitForBit) {
     EXPECT_EQ(run.problem.poses[1].translation, start.poses[1].translation);
     EXPECT_EQ(run.problem.cameras[0].parameters, start.cameras[0].parameters);
     for (std::size_t c = 0; c < start.cameras.size(); ++c) {
-      const ParameterSet principal = principal_point(start.cameras[c].model);
+      const CameraModel model = start.cameras[c].model;
+      const unsigned held = principal_point(model) | image_size(model);
       for (std::size_t k = 0; k < kMaxCameraParameters; ++k) {
         const double before = start.cameras[c].parameters[k],
                      after = run.problem.cameras[c].parameters[k];
         const bool free =
-            k < parameter_count(start.cameras[c].model) && c != 0 && (principal >> k & 1) == 0;
+            k < parameter_count(start.cameras[c].model) && c != 0 && (held >> k & 1) == 0;
         EXPECT_EQ(before == after, !free) << "camera " << c << ", " << k;
       }
     }
@@ -209,10 +211,13 @@ Problem surrounded(CameraModel model, double most_degrees, unsigned seed) {
 }
 
 TEST(LensModels, WideLensesConvergeFromADegreeAndAHundredth) {
-  for (CameraModel model : {CameraModel::opencv_fisheye, CameraModel::simple_radial_fisheye,
-                            CameraModel::radial_fisheye, CameraModel::eucm, CameraModel::fov}) {
+  for (CameraModel model :
+       {CameraModel::opencv_fisheye, CameraModel::simple_radial_fisheye,
+        CameraModel::radial_fisheye, CameraModel::eucm, CameraModel::fov, CameraModel::fisheye,
+        CameraModel::double_sphere, CameraModel::ucm, CameraModel::equirectangular}) {
     SCOPED_TRACE(to_string(model));
-    const Problem truth = surrounded(model, 100, 11);
+    const bool panorama = model == CameraModel::equirectangular;
+    const Problem truth = surrounded(model, panorama ? 180 : 100, 11);
     Problem start = truth;
     std::mt19937 random(12);
     std::normal_distribution<double> normal;
@@ -226,13 +231,72 @@ TEST(LensModels, WideLensesConvergeFromADegreeAndAHundredth) {
     }
     for (double& x : start.points) x *= 1 + 0.01 * normal(random);
     for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
-      if ((principal_point(model) >> k & 1) == 0)
+      if (((principal_point(model) | image_size(model)) >> k & 1) == 0)
         start.cameras[0].parameters[k] *= 1 + 0.01 * normal(random);
     const Solved run(start, {.max_iterations = 100, .tolerance = 1e-12});
     EXPECT_LT(run.summary.final_rms_px, 1e-6);
     for (std::size_t k = 0; k < kMaxCameraParameters; ++k)
       EXPECT_NEAR(run.problem.cameras[0].parameters[k], truth.cameras[0].parameters[k],
                   1e-5 * (1 + std::abs(truth.cameras[0].parameters[k])));
+  }
+}
+
+/// Panoramas amid their points, beside fisheyes, with noise that carries pixels over the borders.
+Problem joined(bool mixed) {
+  Problem problem = surrounded(CameraModel::equirectangular, 180, 21);
+  std::mt19937 random(22);
+  std::normal_distribution<double> normal;
+  for (double& x : problem.observation_xy) x += 3 * normal(random);
+  for (double& x : problem.points) x += 0.01 * normal(random);
+  if (!mixed) return problem;
+  // The odd images see what lies before them through another lens.
+  Problem out = problem;
+  out.cameras.push_back(ordinary(CameraModel::fisheye));
+  out.observation_image.clear(), out.observation_point.clear(), out.observation_xy.clear();
+  for (std::uint32_t j = 1; j < out.num_images(); j += 2) out.image_camera[j] = 1;
+  for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    const std::uint32_t j = problem.observation_image[i], point = problem.observation_point[i];
+    double xy[2] = {problem.observation_xy[2 * i], problem.observation_xy[2 * i + 1]};
+    if (j % 2 == 1) {
+      const auto ray = bearing(problem.cameras[0], xy);
+      if (!ray || (*ray)[2] < -0.5) continue;
+      const auto pixel = project(out.cameras[1], *ray).pixel;
+      xy[0] = pixel[0], xy[1] = pixel[1];
+    }
+    out.add_observation(j, point, xy[0], xy[1]);
+  }
+  return out;
+}
+
+TEST(LensModels, PanoramasAreJoinedAtTheirBorders) {
+  const Problem whole = joined(false);
+  std::size_t crossing = 0;
+  for (std::size_t i = 0; i < whole.num_observations(); ++i)
+    crossing += whole.observation_xy[2 * i] < 0 || whole.observation_xy[2 * i] > 640;
+  EXPECT_GT(crossing, 5u);
+  for (const bool mixed : {false, true}) {
+    SCOPED_TRACE(mixed);
+    const Problem start = joined(mixed);
+    EXPECT_TRUE(evaluate(start).behind.empty());
+    expect_textbook_step(thinned(start, 23), {}, 1e-3);
+    SolveOptions options;
+    options.tolerance = 1e-13;
+    const Solved best(start, options);
+    // A pixel that were not joined would cost 640^2 / 2.
+    EXPECT_LT(best.summary.initial_cost, 50.0 * static_cast<double>(start.num_observations()));
+    EXPECT_NEAR(best.summary.final_cost, evaluate(best.problem).cost,
+                1e-10 * best.summary.final_cost);
+    // A fisheye's pixel is a third of a panorama's.
+    EXPECT_LT(best.summary.final_rms_px, mixed ? 9 : 4.5);
+    EXPECT_EQ(best.problem.cameras[0].parameters, start.cameras[0].parameters);
+    for (Simd simd : {Simd::scalar, Simd::sse4, Simd::avx2, Simd::neon}) {
+      options.simd = simd;
+      Problem problem = start;
+      const Result<Summary> other = try_solve(problem, options);
+      if (!other.ok()) continue;  // the machine does not have it
+      EXPECT_NEAR(other.value().final_cost, best.summary.final_cost,
+                  1e-9 * best.summary.final_cost);
+    }
   }
 }
 

@@ -21,8 +21,10 @@ inline Problem disturbed(const std::vector<Camera>& lenses, std::size_t images, 
   for (double& x : problem.observation_xy) x += 0.3 * normal(random);
   for (double& x : problem.points) x += 0.01 * normal(random);
   for (Camera& camera : problem.cameras)
-    for (std::size_t k = 0; k < parameter_count(camera.model); ++k)
-      camera.parameters[k] *= 1 + 1e-3 * normal(random);
+    for (std::size_t k = 0; k < parameter_count(camera.model); ++k) {
+      const double by = 1 + 1e-3 * normal(random);
+      if (image_size(camera.model) == 0) camera.parameters[k] *= by;
+    }
   return problem;
 }
 

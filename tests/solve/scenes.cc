@@ -107,8 +107,8 @@ double robust_cost(const Problem& problem, const ScaledLoss& loss) {
   double sum = 0;
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
     const auto u = pixel_of(problem, i);
-    const double x = u[0] - problem.observation_xy[2 * i],
-                 y = u[1] - problem.observation_xy[2 * i + 1];
+    const Camera& camera = problem.cameras[problem.image_camera[problem.observation_image[i]]];
+    const auto [x, y] = residual(camera, u, &problem.observation_xy[2 * i]);
     sum += evaluate_loss(loss, x * x + y * y).value;
   }
   return sum / 2;

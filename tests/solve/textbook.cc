@@ -77,8 +77,8 @@ Normal::Normal(const Problem& p, const Places& at, const ScaledLoss& loss, const
     for (int k = 0; k < 3; ++k) P[k] += p.poses[image].translation[k];
     const LensJacobian<double> j = project_with_jacobian(p.cameras[lens], P);
     const double by = p.observation_sigma.empty() ? 1 : 1 / p.observation_sigma[i];
-    const double r[2] = {by * (j.pixel[0] - p.observation_xy[2 * i]),
-                         by * (j.pixel[1] - p.observation_xy[2 * i + 1])};
+    const auto e = residual(p.cameras[lens], j.pixel, &p.observation_xy[2 * i]);
+    const double r[2] = {by * e[0], by * e[1]};
     const LossValue<double> rho = evaluate_loss(loss, r[0] * r[0] + r[1] * r[1]);
     cost += rho.value / 2;
     const double w = std::sqrt(rho.first);

@@ -39,8 +39,21 @@ TEST(Bearing, IsNoneWhereNoDirectionHasThePixel) {
   EXPECT_FALSE(bearing(camera, far).has_value());
 }
 
+TEST(Bearing, OfAPanoramaIsInAnyDirection) {
+  const Camera panorama = ordinary(CameraModel::equirectangular);
+  for (const Vector3<double>& P :
+       {Vector3<double>{0, 0, -1}, {0.6, 0, -0.8}, {-0.6, 0.64, -0.48}, {0, 1, 0}}) {
+    const auto found = bearing(panorama, project(panorama, P).pixel.data());
+    ASSERT_TRUE(found.has_value());
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR((*found)[k], P[k], 1e-15);
+  }
+  const double over_the_pole[2] = {100, 480.5};
+  EXPECT_FALSE(bearing(panorama, over_the_pole).has_value());
+}
+
 TEST(Bearing, WithoutDistortionEveryModelIsNearlyThePinholeOrEquidistant) {
   for (CameraModel model : all_models()) {
+    if (model == CameraModel::equirectangular) continue;  // it has no axis
     const Camera plain = without_distortion(ordinary(model));
     const double forward = model == CameraModel::bal ? -1 : 1;
     const auto centre = project(plain, {0, 0, forward}).pixel;
