@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,8 @@ double now_ms() {
   using namespace std::chrono;
   return duration<double, std::milli>(steady_clock::now().time_since_epoch()).count();
 }
+/// Of all threads of this process.
+double cpu_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -72,15 +75,24 @@ struct Way {
   int threads;
   Solver solver;
   std::vector<double> ms{};
-  double cost = 0;
+  double cpu_ms = 0;            ///< of all times together
+  std::vector<double> costs{};  ///< after each step of the last time
 };
 
 void print(const std::vector<Way>& ways, const Problem& window) {
   std::printf("{\"images\": %zu, \"points\": %zu, \"observations\": %zu, \"ways\": [",
               window.num_images(), window.num_points(), window.num_observations());
-  for (const Way& way : ways)
-    std::printf("%s\n  {\"way\": \"%s\", \"threads\": %d, \"ms\": %.4f, \"cost\": %.17g}",
-                &way == ways.data() ? "" : ",", way.name, way.threads, median(way.ms), way.cost);
+  for (const Way& way : ways) {
+    std::printf(
+        "%s\n  {\"way\": \"%s\", \"threads\": %d, \"ms\": %.4f, \"least_ms\": %.4f, "
+        "\"cpu_ms\": %.4f, \"costs\": [",
+        &way == ways.data() ? "" : ",", way.name, way.threads, median(way.ms),
+        *std::min_element(way.ms.begin(), way.ms.end()),
+        way.cpu_ms / static_cast<double>(way.ms.size()));
+    for (const double& cost : way.costs)
+      std::printf("%s%.17g", &cost == way.costs.data() ? "" : ", ", cost);
+    std::printf("]}");
+  }
   std::printf("\n]}\n");
 }
 
@@ -108,11 +120,19 @@ int run(const Arguments& a) {
       // What a camera would have seen otherwise: another number in every place.
       const double by = 1e-6 * pair;
       for (double& x : problem.observation_xy) x += by;
-      const double begin = now_ms();
-      way.cost = std::strcmp(way.name, "fresh") == 0
-                     ? solve(problem, way.solver.options()).final_cost
-                     : way.solver.solve(problem).final_cost;
-      if (pair >= 3) way.ms.push_back(now_ms() - begin);
+      const double cpu_begin = cpu_ms(), begin = now_ms();
+      Summary fresh;
+      const Summary* summary = &fresh;
+      if (std::strcmp(way.name, "fresh") == 0)
+        fresh = solve(problem, way.solver.options());
+      else
+        summary = &way.solver.solve(problem);
+      const double end = now_ms();
+      if (pair < 3) continue;
+      way.ms.push_back(end - begin);
+      way.cpu_ms += cpu_ms() - cpu_begin;
+      way.costs.clear();
+      for (const Iteration& it : summary->iterations) way.costs.push_back(it.cost);
     }
   print(ways, window);
   return 0;

@@ -14,19 +14,19 @@ import numpy
 
 import sheaf
 
-FRAMES = int(sys.argv[1]) if len(sys.argv) > 1 else 40
 WINDOW = 10
 PIXEL, OUTLIERS = 0.5, 0.01
+OPTIONS = {"fix": "intrinsics", "loss": "huber:3", "tolerance": 1e-6}
 rng = numpy.random.default_rng(1)
 lens = sheaf.Camera("PINHOLE", numpy.array([400.0, 400.0, 320.0, 240.0]), 640, 480)
 
 
-def street():
+def street(frames):
     """True poses, points, and (frame, point, x, y) of what is seen, some of it wrong."""
-    poses = numpy.tile([1.0, 0, 0, 0, 0, 0, 0], (FRAMES, 1))
-    poses[:, 4] = -1.5 * numpy.arange(FRAMES)  # t = -R C
-    poses[:, 5] = -0.2 * numpy.sin(0.3 * numpy.arange(FRAMES))
-    points = rng.uniform([-4, -4, 5], [1.5 * FRAMES + 4, 4, 12], (26 * FRAMES, 3))
+    poses = numpy.tile([1.0, 0, 0, 0, 0, 0, 0], (frames, 1))
+    poses[:, 4] = -1.5 * numpy.arange(frames)  # t = -R C
+    poses[:, 5] = -0.2 * numpy.sin(0.3 * numpy.arange(frames))
+    points = rng.uniform([-4, -4, 5], [1.5 * frames + 4, 4, 12], (26 * frames, 3))
     seen = []
     for frame, pose in enumerate(poses):
         local = points + pose[4:]
@@ -71,18 +71,27 @@ def switch_off_outliers(problem):
     problem.observation_sigma[(off**2).sum(axis=1) > (4 * PIXEL) ** 2] = numpy.inf
 
 
-def run():
-    truth, true_points, seen = street()
-    points = true_points + 0.1 * rng.normal(size=true_points.shape)  # as a front end finds them
+def known_start(poses):
+    """The first two poses are known: they say where everything is, and how large."""
+    blocks = [("pose", i, poses[i]) for i in (0, 1)]
+    return {"blocks": blocks, "square_root": 1e5 * numpy.eye(12), "mean": None}
+
+
+def leave(problem):
+    """What the oldest frame, and the points that it sees, say of the frames that stay."""
+    points = numpy.unique(problem.observation_point[problem.observation_image == 0])
+    prior = sheaf.marginalise(problem, [0], points, loss=OPTIONS["loss"], fix=OPTIONS["fix"])
+    prior["blocks"] = [(kind, i - 1, state) for kind, i, state in prior["blocks"]]
+    return points, prior
+
+
+def run(truth, points, seen):
+    """The poses that a sliding window finds, and its seconds for each frame."""
     poses = truth.copy()
-    solver = sheaf.Solver(fix="intrinsics", loss="huber:3", tolerance=1e-6)
-    # The first two poses are known: they say where everything is, and how large.
-    known = [("pose", i, poses[i]) for i in (0, 1)]
-    prior = {"blocks": known, "square_root": 1e5 * numpy.eye(12), "mean": None}
-    first_frame, seconds = 0, []
-    for newest in range(1, FRAMES):
-        if newest > 1:
-            # As it was seen from the truth, and a guess that is off.
+    solver = sheaf.Solver(**OPTIONS)
+    prior, first_frame, seconds = known_start(poses), 0, []
+    for newest in range(1, len(poses)):
+        if newest > 1:  # a guess that is off
             step = truth[newest, 4:] - truth[newest - 1, 4:]
             poses[newest] = poses[newest - 1]
             poses[newest, 4:] += step + 0.02 * rng.normal(size=3)
@@ -93,23 +102,27 @@ def run():
         switch_off_outliers(problem)
         solver.solve(problem)
         assert solver.was_kept
-        if len(frames) == WINDOW and newest + 1 < FRAMES:
-            # The oldest frame leaves, and so do the points that it sees: what they say of the other
-            # frames stays. Later frames see some of these again, as new ones.
-            leaving = numpy.unique(problem.observation_point[problem.observation_image == 0])
-            prior = sheaf.marginalise(problem, [0], leaving, loss="huber:3", fix="intrinsics")
-            prior["blocks"] = [(kind, i - 1, state) for kind, i, state in prior["blocks"]]
-            seconds.append(time.perf_counter() - begin)
-            used_up = numpy.isin(seen[:, 1].astype(int), ids[leaving]) & (seen[:, 0] <= newest)
-            seen = seen[~used_up]
-            first_frame += 1
         poses[frames] = problem.poses
         points[ids] = problem.points
-    return truth, poses, seconds
+        if len(frames) == WINDOW:
+            # What later frames see of the points that leave are new points.
+            leaving, prior = leave(problem)
+            gone = numpy.isin(seen[:, 1].astype(int), ids[leaving]) & (seen[:, 0] <= newest)
+            seen = seen[~gone]
+            first_frame += 1
+        seconds.append(time.perf_counter() - begin)
+    return poses, numpy.array(seconds)
 
 
-truth, poses, seconds = run()
-off = numpy.linalg.norm(poses[:, 4:] - truth[:, 4:], axis=1)
-print(f"{FRAMES} frames: the last is off by {off[-1]:.4f} after {1.5 * (FRAMES - 1):.0f} units")
-print(f"windows of {WINDOW}: {1e3 * numpy.median(seconds):.1f} ms, at most {1e3 * max(seconds):.1f}")
-assert off[-1] < 0.5
+def main(frames):
+    truth, true_points, seen = street(frames)
+    points = true_points + 0.1 * rng.normal(size=true_points.shape)  # as a front end finds them
+    poses, seconds = run(truth, points, seen)
+    off = numpy.linalg.norm(poses[-1, 4:] - truth[-1, 4:])
+    print(f"{frames} frames: the last is off by {off:.4f} after {1.5 * (frames - 1):.0f} units")
+    print(f"a frame takes {1e3 * numpy.median(seconds):.1f} ms, at most {1e3 * max(seconds):.1f}")
+    assert off < 0.005 * frames
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)

@@ -92,13 +92,18 @@ double NormalEquations::weight_of(const ObservationRows::Row& row) const {
 void NormalEquations::sort_by_point() {
   std::vector<std::uint8_t> kept(problem_.num_points(), 0);
   for (const std::uint32_t p : blocks_.kept) kept[p] = 1;
+  const auto takes_part = [&](std::uint64_t i) {
+    const std::vector<double>& sigma = problem_.observation_sigma;
+    return kept[problem_.observation_point[i]] == 0 && (sigma.empty() || !std::isinf(sigma[i]));
+  };
   first_.assign(problem_.num_points() + 1, 0);
-  for (const std::uint32_t p : problem_.observation_point) first_[p + 1] += kept[p] == 0;
+  for (std::uint64_t i = 0; i < problem_.num_observations(); ++i)
+    if (takes_part(i)) ++first_[problem_.observation_point[i] + 1];
   for (std::size_t p = 0; p < problem_.num_points(); ++p) first_[p + 1] += first_[p];
   order_.resize(first_.back());
   std::vector<std::uint64_t> next(first_.begin(), first_.end() - 1);
   for (std::uint64_t i = 0; i < problem_.num_observations(); ++i)
-    if (const std::uint32_t p = problem_.observation_point[i]; kept[p] == 0) order_[next[p]++] = i;
+    if (takes_part(i)) order_[next[problem_.observation_point[i]]++] = i;
 }
 
 NormalEquations::TermRowsOf NormalEquations::rows_of(const Term& term,

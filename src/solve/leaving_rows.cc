@@ -157,9 +157,7 @@ LeavingRows leaving_rows(const Problem& problem, const LeavingBlocks& leaving, c
   out.first_estimates = out.now;
   keep_first_estimates(problem, points, out);
   std::vector<std::uint8_t> skip(problem.num_observations(), 0);
-  for (std::size_t i = 0; i < skip.size(); ++i)
-    skip[i] = !leaving.takes(problem, i) ||
-              (!problem.observation_sigma.empty() && std::isinf(problem.observation_sigma[i]));
+  for (std::size_t i = 0; i < skip.size(); ++i) skip[i] = !leaving.takes(problem, i);
   for (auto& term :
        make_terms(problem, TermPlaces::of_parameters(problem), points, skip, nullptr)) {
     const auto& places = term->places();

@@ -221,6 +221,7 @@ void add_observations(const Problem& problem, const TermPlaces& places,
     const std::uint32_t point = problem.observation_point[i];
     if ((!skip.empty() && skip[i] != 0) || !std::binary_search(kept.begin(), kept.end(), point))
       continue;
+    if (!problem.observation_sigma.empty() && std::isinf(problem.observation_sigma[i])) continue;
     const std::uint32_t image = problem.observation_image[i], lens = problem.image_camera[image];
     KeptObservation::Sight sight{
         image,

@@ -183,26 +183,30 @@ void TermRows::add_to_sums(const Term& term, const Linear& of, const Couplings& 
                            double* more_tiles, double* diagonal) {
   const auto& places = term.places();
   const std::size_t n = places.size();
-  const auto product = [&](std::size_t a, std::size_t b) {
-    double sum = 0;
-    for (std::size_t row = 0; row < of.r.size(); ++row)
-      sum += of.J[row * n + a] * of.J[row * n + b];
-    return sum;
-  };
+  // J^T J, row by row: a Gaussian of a window has some fifty rows and columns.
+  products_.assign(n * n, 0);
+  for (std::size_t row = 0; row < of.r.size(); ++row)
+    for (std::size_t a = 0; a < n; ++a)
+      for (std::size_t b = 0; b < n; ++b)
+        products_[a * n + b] += of.J[row * n + a] * of.J[row * n + b];
   for (std::size_t a = 0; a < n; ++a) {
     const TermPlace& row = places[a];
     if (!row.stands()) continue;
     double* block = diagonal + kDiagonalDoubles * row.block;
     for (std::size_t r = 0; r < of.r.size(); ++r)
       block[diagonal_layout::right_side(row.column)] += of.J[r * n + a] * of.r[r];
+    std::uint32_t known = TermPlace::kHeld;
+    double* tile = nullptr;
     for (std::size_t b = 0; b < n; ++b) {
       const TermPlace& column = places[b];
       if (!column.stands()) continue;
       if (column.block == row.block && diagonal_layout::is_stored(row.column, column.column))
-        block[diagonal_layout::at(row.column, column.column)] += product(a, b);
+        block[diagonal_layout::at(row.column, column.column)] += products_[a * n + b];
       if (column.block >= row.block) continue;
-      double* tile = more_tiles + kTileDoubles * number_of(couplings, row.block, column.block);
-      tile[tile_layout::at(row.column, column.column)] -= product(a, b);
+      if (column.block != known)
+        tile = more_tiles + kTileDoubles * number_of(couplings, row.block, column.block);
+      known = column.block;
+      tile[tile_layout::at(row.column, column.column)] -= products_[a * n + b];
     }
   }
 }

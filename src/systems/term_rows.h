@@ -64,8 +64,8 @@ class TermRows : public PointRows {
 
   void linearize();
   Costs add_costs(const CameraState& at, const Costs& of_rows, const ScaledLoss& loss) const;
-  static void add_to_sums(const Term& term, const Linear& of, const Couplings& couplings,
-                          double* more_tiles, double* diagonal);
+  void add_to_sums(const Term& term, const Linear& of, const Couplings& couplings,
+                   double* more_tiles, double* diagonal);
   /// y += (N J)^T N J x, block vectors.
   void multiply(const double* x, double* y) const;
 
@@ -77,6 +77,7 @@ class TermRows : public PointRows {
   const SteppedState* state_ = nullptr;
   ScaledLoss loss_;
   std::vector<Linear> linear_;
+  std::vector<double> products_;  ///< of a term's columns
 };
 
 }  // namespace sheaf
