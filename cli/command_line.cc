@@ -86,6 +86,7 @@ void add_options(CLI::App& app, const std::vector<BoundOption>& options) {
 void add_verb(CLI::App& app, const Verb& verb, int& exit_code) {
   CLI::App& added = *app.add_subcommand(verb.name, verb.purpose);
   for (const BoundOption& place : verb.places) add(added, place.spec.name, place)->required();
+  for (const BoundOption& place : verb.more_places) add(added, place.spec.name, place);
   add_options(added, verb.options);
   added.footer(verb.examples);
   added.callback([&verb, &exit_code] { exit_code = verb.run(); });

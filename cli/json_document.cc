@@ -188,6 +188,7 @@ Json bounds_json(const Summary& s) {
 Json solve_json(const SolveRecord& record, const Summary& s, const Problem& problem) {
   return {
       {"version", SHEAF_VERSION},
+      {"command", record.command},
       {"input", record.input},
       {"options", record.options},
       {"rig_configuration", record.rig_configuration},

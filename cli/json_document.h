@@ -40,6 +40,7 @@ Json checkpoints_json(const Summary& summary);
 /// What the JSON of a solve is made of.
 struct SolveRecord {
   Json input, options;
+  std::string command{};     ///< that was given
   Json rig_configuration{};  ///< null without --rigs
   Evaluation before, after;  ///< by independent code
   bool agrees = true;        ///< the solver's final cost with it

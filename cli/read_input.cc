@@ -8,9 +8,9 @@
 
 namespace sheaf {
 
-InputFile read_input(const std::string& path, const CommonOptions& common) {
+InputFile read_input(const std::string& path, const CommonOptions& common, bool hash) {
   const Activity reading(common.quiet, "reading " + path, &transfers.read, bytes_at(path));
-  return read_file(path, {.hash = !common.json.empty()}).value();
+  return read_file(path, {.hash = hash}).value();
 }
 
 }  // namespace sheaf

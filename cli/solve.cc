@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +21,7 @@
 #include "live_line.h"
 #include "options/solve_options.h"
 #include "outputs.h"
+#include "page/report.h"
 #include "platform/transfers.h"
 #include "progress.h"
 #include "read_input.h"
@@ -39,7 +42,8 @@ struct Arguments {
   SolveArguments solve;
   RigsArguments rigs;
   ConstraintsArguments constraints;
-  std::string in, out, ply, sigmas, log;
+  std::string in, out, ply, sigmas, log, report, images;
+  std::function<std::string()> command{};  ///< that was given
 };
 
 // All but the observations, which are most of the memory while the solver needs its own.
@@ -50,6 +54,35 @@ Problem state_of(const Problem& problem) {
   state.cameras = problem.cameras;
   state.points = problem.points;
   return state;
+}
+
+// What a page needs of the start: names, with which the result's images and points are told.
+Problem start_of(const Problem& problem, std::shared_ptr<const SceneMetadata> metadata) {
+  Problem start = state_of(problem);
+  start.rigs = problem.rigs;
+  if (metadata == nullptr) return start;
+  auto names = std::make_shared<SceneMetadata>();
+  names->image_names = metadata->image_names;
+  names->image_ids = metadata->image_ids;
+  names->point_ids = metadata->point_ids;
+  start.metadata = std::move(names);
+  return start;
+}
+
+// --report: of the end, in the frame that a survey has brought the problem into.
+void write_page(const Arguments& arguments, Problem start, const Problem& problem,
+                const SolveOptions& solved, const Summary& summary, const Json& document) {
+  start.points.resize(problem.points.size());
+  ReportOptions options;
+  options.title = std::filesystem::path(arguments.in).filename().string();
+  options.images = arguments.images;
+  options.summary = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  options.fixed = solved.fixed;
+  options.threads = solved.threads;
+  options.in_place = !arguments.constraints.paths.empty();
+  if (solved.loss.kind != LossKind::none)
+    options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
+  write_report(&start, problem, arguments.report, options).value();
 }
 
 // Says what --fix and --refine leave where it is; nothing where nothing was asked for.
@@ -212,20 +245,36 @@ std::vector<NamedOutput> outputs_of(const Arguments& arguments) {
   return {{"-o", arguments.out, true},    {"--json", arguments.common.json},
           {"--ply", arguments.ply},       {"--residuals", arguments.constraints.residuals},
           {"--sigmas", arguments.sigmas}, {"--checkpoint", arguments.solve.options.checkpoint},
-          {"--log", arguments.log}};
+          {"--log", arguments.log},       {"--report", arguments.report}};
+}
+
+// JSON and page, which tell what became of the run.
+void write_record(const Arguments& arguments, const SolveRecord& record, const SurveyWork& work,
+                  const SolveOptions& options, const Summary& summary, Problem start,
+                  const Problem& problem, std::vector<std::string>& written) {
+  Json document = solve_json(record, summary, problem);
+  document["survey"] = survey_json(work.survey, &work.report);
+  if (!arguments.common.json.empty()) {
+    write_json(document, arguments.common.json);
+    written.push_back(arguments.common.json);
+  }
+  if (arguments.report.empty() || !summary.usable()) return;
+  write_page(arguments, std::move(start), problem, options, summary, document);
+  written.push_back(arguments.report);
 }
 
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
-  const bool wants_json = !arguments.common.json.empty();
+  const bool wants_json = !arguments.common.json.empty() || !arguments.report.empty();
   check_outputs(outputs_of(arguments), inputs_of(arguments));
   interrupt.limit(arguments.solve.options.time_limit_s);
-  InputFile input = read_input(arguments.in, arguments.common);
+  InputFile input = read_input(arguments.in, arguments.common, wants_json);
   Problem& problem = input.problem;
   check_holds(problem, arguments.out);
 
   SolveRecord record;
+  record.command = arguments.command();
   record.options = options_json(options_of(arguments.solve));
   record.read_s = input.read_s;
   if (wants_json) record.input = input_json(arguments.in, input);
@@ -237,8 +286,10 @@ int run(Arguments& arguments) {
   SolveOptions options = options_for(arguments, interrupt, progress, log);
   const std::string held = hold(arguments.solve.refinement, problem, options.fixed);
   if (options.max_iterations > 0) check_holds_refined(problem, options.fixed, arguments.out);
+  const std::shared_ptr<const SceneMetadata> metadata = problem.metadata;
   SurveyWork work{place_survey(arguments.constraints, problem, options.fixed)};
   Problem before = arguments.ply.empty() ? Problem() : state_of(problem);
+  Problem start = arguments.report.empty() ? Problem() : start_of(problem, metadata);
   interrupt.begin_solve();
   progress.begin();
   options.time_limit_s = interrupt.left_s();
@@ -262,10 +313,7 @@ int run(Arguments& arguments) {
   say(arguments, input, record, work, sigmas, summary, held);
   if (wants_json) {
     record.total_s = total.seconds();
-    Json document = solve_json(record, summary, problem);
-    document["survey"] = survey_json(work.survey, &work.report);
-    write_json(document, arguments.common.json);
-    written.push_back(arguments.common.json);
+    write_record(arguments, record, work, options, summary, std::move(start), problem, written);
   }
   if (!written.empty()) print_out("wrote       {}\n", fmt::join(written, ", "));
   if (summary.usable() && !arguments.out.empty())
@@ -299,10 +347,20 @@ Verb solve_verb() {
                            {.name = "sigmas",
                             .placeholder = "FILE",
                             .help = "how well the end is known, as JSON (docs/covariance.md)"}),
+                   F::text(&Arguments::report,
+                           {.name = "report",
+                            .placeholder = "FILE",
+                            .help = "show start and result as one page of HTML (docs/report.md)"}),
+                   F::text(&Arguments::images,
+                           {.name = "images",
+                            .placeholder = "FOLDER",
+                            .help = "of --report: where the images are, for thumbnails",
+                            .needs = {"report"}}),
                    F::text(&Arguments::log, log_of_steps())},
                   *a),
               own(options_of(a->solve)), options_of(a->rigs), options_of(a->constraints, true),
               options_of(a->common)});
+  a->command = command_of(verb);
   verb.run = [a] { return run(*a); };
   return verb;
 }

@@ -16,6 +16,7 @@ struct Verb {
   std::string name, purpose;
   std::string examples;                          ///< below the help; the first one runs as it is
   std::vector<BoundOption> places{}, options{};  ///< arguments by place, all needed; and by name
+  std::vector<BoundOption> more_places{};        ///< behind those that are needed
   /// Once all that was given is set. Returns the exit code; errors are thrown as sheaf::Error.
   std::function<int()> run{};
 };
@@ -33,6 +34,8 @@ Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();
 Verb demo_verb();
+Verb report_verb();
+Verb view_verb();
 /// All of them, in the order of the command's help.
 std::vector<Verb> all_verbs();
 
@@ -43,6 +46,10 @@ struct CommonOptions {
   bool quiet = false;  ///< nothing on stderr but errors
 };
 std::vector<BoundOption> options_of(CommonOptions& options);
+
+/// The command line that a verb was given, as far as it says something: what is as before anything
+/// was given is left out. Asked for once all is set; made before.
+std::function<std::string()> command_of(const Verb& verb);
 
 /// Lists behind one another.
 std::vector<BoundOption> joined(std::initializer_list<std::vector<BoundOption>> lists);

@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,9 +13,12 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "clean_fields.h"
+#include "fork_safety.h"
 #include "inspect/clean.h"
+#include "io/folder_files.h"
 #include "io/rig_configuration_file.h"
 #include "keyword_options.h"
+#include "page/report.h"
 #include "scene/rig_configuration.h"
 #include "sheaf/io.h"
 
@@ -67,6 +71,22 @@ nb::object clean_problem(const ProblemHandle& held, const nb::kwargs& keywords) 
   return record_of(record);
 }
 
+void report_problem(const ProblemHandle& held, const fs::path& path, nb::handle before,
+                    const fs::path& images, const fs::path& summary, const std::string& title,
+                    bool sigmas, int threads) {
+  const ReadUse use(held);
+  std::optional<ReadUse> start;
+  if (!before.is_none()) start.emplace(nb::cast<ProblemHandle>(before));
+  const nb::gil_scoped_release released;
+  ReportOptions options{.title = title, .images = images, .sigmas = sigmas};
+  options.threads = threads_here(threads);
+  if (!summary.empty()) {
+    options.summary = bytes_of(summary).value();
+    options.summary_name = summary.string();
+  }
+  write_report(start ? &start->problem() : nullptr, use.problem(), path, options).value();
+}
+
 std::vector<std::string> convert_file(const fs::path& in, const fs::path& out,
                                       const nb::kwargs& keywords) {
   nb::dict left = nb::cast<nb::dict>(keywords.attr("copy")());
@@ -106,6 +126,17 @@ void bind_files(nb::module_& module, ProblemClass& problem) {
       nb::sig("def write(self, path: str | os.PathLike[str], format: str = '') -> None"),
       "Writes the problem, whole or not at all, in the format named or the one that the "
       "path's name means (docs/formats.md). Raises sheaf.Error (unwritable_output, usage).");
+  problem.def(
+      "report", &report_problem, nb::arg("path"), nb::kw_only(), nb::arg("before") = nb::none(),
+      nb::arg("images") = "", nb::arg("summary") = "", nb::arg("title") = "",
+      nb::arg("sigmas") = true, nb::arg("threads") = 0,
+      nb::sig("def report(self, path: str | os.PathLike[str], *, before: Problem | None = None, "
+              "images: str | os.PathLike[str] = '', summary: str | os.PathLike[str] = '', title: "
+              "str = '', sigmas: bool = True, threads: int = 0) -> None"),
+      "Writes one page of HTML that shows the problem (docs/report.md); before: the start that it "
+      "came from, images: a folder of pictures, summary: the JSON of a solve by the command. "
+      "Raises "
+      "sheaf.Error (usage, unreadable_input, unwritable_output).");
   problem.def("lost_in", &losses_in, nb::arg("format"),
               "Sentences about what of the problem this format does not hold.");
   CleanOptions fresh;

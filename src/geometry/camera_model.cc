@@ -96,6 +96,11 @@ ParameterRoles roles_of(CameraModel model) {
   });
 }
 
+std::array<double, 2> principal_point_of(const Camera& camera) {
+  if (camera.model == CameraModel::bal) return {0, 0};
+  return project(camera, {0, 0, 1}).pixel;
+}
+
 double pixels_per_radian(const Camera& camera) {
   const int fx = roles_of(camera.model).fx;
   if (fx < 0) return camera.parameters[0] / (2 * std::numbers::pi);

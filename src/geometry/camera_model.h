@@ -41,6 +41,8 @@ ParameterRoles roles_of(CameraModel model);
 
 /// The focal length; of a panorama w / 2 pi.
 double pixels_per_radian(const Camera& camera);
+/// Where the lens sees what is straight ahead, pixels: of most models (cx, cy).
+std::array<double, 2> principal_point_of(const Camera& camera);
 
 int colmap_id(CameraModel model);
 std::optional<CameraModel> camera_model_of_colmap(int id);

@@ -8,6 +8,10 @@
 
 namespace sheaf {
 
+/// r of each observation, modelled less measured: x and y in turn, px; may be infinite or NaN. The
+/// bits do not depend on the number of threads (0: all).
+std::vector<double> residuals(const Problem& problem, int threads = 1);
+
 /// |r| of each observation, px; may be infinite or NaN.
 std::vector<double> residual_lengths(const Problem& problem);
 

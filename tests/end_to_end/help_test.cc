@@ -103,7 +103,11 @@ std::set<std::string> options_of(const std::string& verb) {
     options.insert({"--projection", "--projection-figure", "--distance", "--grid"});
   if (verb == "calibrate")
     options.insert({"--board", "--spacing", "--size", "--camera", "--focal", "--loss", "--output"});
-  if (verb == "solve") options.insert({"--sigmas", "--log"});
+  if (verb == "solve") options.insert({"--sigmas", "--log", "--report", "--images"});
+  if (verb == "report")
+    options.insert({"--output", "--summary", "--images", "--title", "--no-sigmas"});
+  if (verb == "view")
+    options.insert({"--summary", "--images", "--title", "--no-sigmas", "--no-open"});
   if (verb == "info") options.insert("--pattern");
   if (verb == "convert")
     options.insert({"--format", "--max-error", "--drop-behind", "--drop-repeated", "--min-angle",
@@ -192,15 +196,16 @@ TEST_P(Help, ExampleRuns) {
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
                                          "align", "covariance", "calibrate", "photometric",
-                                         "generate", "demo"),
+                                         "report", "generate", "demo"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "align",
-                           "covariance", "calibrate", "compare", "photometric", "generate", "demo"})
+  for (const char* verb :
+       {"solve", "info", "check", "convert", "perturb", "evaluate", "align", "covariance",
+        "calibrate", "compare", "photometric", "report", "view", "generate", "demo"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);

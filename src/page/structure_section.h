@@ -1,0 +1,18 @@
+// Copyright (c) 2026, the Sheaf authors.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "page/page_scene.h"
+
+namespace sheaf {
+
+/// Who sees what with whom: common points of images, lengths of tracks, angles at which rays meet,
+/// patterns of the matrices.
+std::string structure_section(const PageScene& scene);
+
+/// What the margin says of it.
+std::string structure_words(const PageScene& scene);
+
+}  // namespace sheaf
