@@ -97,8 +97,11 @@ ParameterRoles roles_of(CameraModel model) {
 }
 
 std::array<double, 2> principal_point_of(const Camera& camera) {
-  if (camera.model == CameraModel::bal) return {0, 0};
-  return project(camera, {0, 0, 1}).pixel;
+  const ParameterRoles roles = roles_of(camera.model);
+  if (image_size(camera.model) != 0) return {camera.parameters[0] / 2, camera.parameters[1] / 2};
+  if (roles.cx < 0) return {0, 0};
+  return {camera.parameters[static_cast<std::size_t>(roles.cx)],
+          camera.parameters[static_cast<std::size_t>(roles.cy)]};
 }
 
 double pixels_per_radian(const Camera& camera) {

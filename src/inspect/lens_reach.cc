@@ -15,15 +15,6 @@ namespace {
 constexpr double kAbsurd = 100, kReach = 10;  ///< times the median distance
 constexpr std::size_t kFewOfLens = 10;
 
-std::array<double, 2> principal_point_of(const Camera& camera) {
-  const ParameterRoles roles = roles_of(camera.model);
-  if (camera.model == CameraModel::equirectangular)
-    return {camera.parameters[0] / 2, camera.parameters[1] / 2};
-  if (roles.cx < 0) return {0, 0};
-  return {camera.parameters[static_cast<std::size_t>(roles.cx)],
-          camera.parameters[static_cast<std::size_t>(roles.cy)]};
-}
-
 /// Where the middle of the image is; BAL's pixels count from there.
 std::array<double, 2> middle_of(const Camera& camera) {
   if (camera.model == CameraModel::bal) return {0, 0};

@@ -167,7 +167,7 @@ std::string distortion_chart(const PageScene& scene, const std::vector<LensUse>&
       plot.text(plot.left() + 8, plot.bottom() - 9, "before", "t bf");
     }
   }
-  const bool angles = counts_angles(scene.result.cameras[uses[0].lens].model);
+  const bool angles = is_fisheye(scene.result.cameras[uses[0].lens].model);
   return figure("Distortion",
                 std::string("how far the lens moves a point outwards, up to its outermost "
                             "observation") +
