@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -128,12 +129,16 @@ int run(Arguments& arguments) {
               problem.brightness[i].b);
   if (!outputs.pictures().empty())
     print_out("pictures    {} in {}\n", outputs.pictures().size(), arguments.outputs.pictures);
-  if (!arguments.common.json.empty()) {
+  if (!arguments.common.json.empty() || outputs.wants_page()) {
     const PhotometricRecord record{
         arguments.in,       folder.format, options_json(options_of(arguments.photometric)),
         outputs.pictures(), folder.read_s, write_s,
         total.seconds(),    before,        after};
-    write_json(photometric_json(record, summary, details, problem), arguments.common.json);
+    const Json document = photometric_json(record, summary, details, problem);
+    if (!arguments.common.json.empty()) write_json(document, arguments.common.json);
+    outputs.write_page(folder, details,
+                       document.dump(-1, ' ', false, Json::error_handler_t::replace),
+                       std::filesystem::path(arguments.in).filename().string());
   }
   log.end(summary.solve);
   return exit_code_of(summary.solve.termination);

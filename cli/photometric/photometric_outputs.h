@@ -16,7 +16,7 @@ namespace sheaf {
 
 /// What `photometric` writes beside its summary; empty: not asked for.
 struct PhotometricOutputArguments {
-  std::string out, ply, pictures, log;
+  std::string out, ply, pictures, log, report;
 };
 std::vector<BoundOption> options_of(PhotometricOutputArguments& arguments);
 
@@ -35,13 +35,20 @@ class PhotometricOutputs {
   void write(const PhotometricFolder& folder, const PhotometricDetails& details,
              const PhotometricOptions& options);
 
+  /// --report, last of all. summary: JSON of the run; title: the folder's name.
+  void write_page(const PhotometricFolder& folder, const PhotometricDetails& details,
+                  const std::string& summary, const std::string& title) const;
+  bool wants_page() const { return !arguments_.report.empty(); }
+
   /// Names of the files in the pictures' folder.
   const std::vector<std::string>& pictures() const { return pictures_; }
 
  private:
   PhotometricOutputArguments arguments_;
   std::optional<Problem> start_;  ///< for the PLY file
+  std::optional<Problem> cloud_;  ///< of the start, for the page
   std::optional<PatchStage> stage_;
+  std::optional<PatchComparison> comparison_;
   std::vector<std::string> pictures_;
 };
 

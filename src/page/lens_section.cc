@@ -364,9 +364,10 @@ std::string lens_section(const PageScene& scene, const Covariance* known) {
       charts += projection_chart(scene, use.lens, use.name, *known);
       charts += correlation_chart(scene, use.lens, use.name, *known);
     }
-  const bool few = uses.size() <= kFewLenses;
-  return std::string("<div class=\"lens") + (few ? " few" : "") + "\"><div>" + charts + "</div>" +
-         tables(scene, uses, known, ends) + "</div>";
+  if (uses.size() <= kFewLenses)
+    return "<div class=\"grid\">" + charts + "</div>" + tables(scene, uses, known, ends);
+  return "<div class=\"lens\"><div>" + charts + "</div>" + tables(scene, uses, known, ends) +
+         "</div>";
 }
 
 }  // namespace sheaf

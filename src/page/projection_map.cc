@@ -32,7 +32,7 @@ void add_legend(Drawing& out, const std::array<double, kShades - 1>& bounds, dou
   for (std::size_t k = 0; k < kShades; ++k) {
     const double y = 18 + 20 * double(kShades - 1 - k);
     out.rectangle(x, y, 14, 14, "d" + std::to_string(k));
-    out.text(x + 21, y + 11, k == 0 ? "< " + digits(bounds[0], 2) : "≥ " + digits(bounds[k - 1], 2),
+    out.text(x + 21, y + 11, k == 0 ? "< " + digits(bounds[0], 3) : "≥ " + digits(bounds[k - 1], 3),
              "a");
   }
 }
@@ -79,8 +79,8 @@ std::string projection_chart(const PageScene& scene, std::uint32_t lens, const s
   for (std::size_t k = 0; k < kShades; ++k) out.path(paths[k], "d" + std::to_string(k));
   out.rectangle(0, 0, wide, tall, "mx");
   add_legend(out, bounds, wide + 18);
-  out.text(wide + 18, 136, "median " + digits(middle, 2), "a");
-  out.text(wide + 18, 151, "at most " + digits(most, 2), "a");
+  out.text(wide + 18, 136, "median " + digits(middle), "a");
+  out.text(wide + 18, 151, "at most " + digits(most), "a");
   return figure("Where " + name + " looks",
                 "σ of the pixel of a place infinitely far away, as lens and poses vary together",
                 out.svg(360, std::max(tall + 2, 160.0), "Projection uncertainty over the image"));
@@ -95,7 +95,7 @@ std::string correlation_chart(const PageScene& scene, std::uint32_t lens, const 
   std::vector<std::size_t> free;
   for (std::size_t k = 0; k < n; ++k)
     if (C[k * n + k] > 0 && std::isfinite(C[k * n + k])) free.push_back(k);
-  if (free.size() < 2) return "";
+  if (free.size() < 3) return "";
   const double cell = std::min(34.0, 240.0 / double(free.size())), left = 56;
   Drawing out;
   double strongest = 0;

@@ -15,7 +15,7 @@ namespace sheaf {
 std::string projection_chart(const PageScene& scene, std::uint32_t lens, const std::string& name,
                              const Covariance& known);
 
-/// Which parameters of a lens go together. Nothing where fewer than two are free.
+/// Which parameters of a lens go together. Nothing where fewer than three are free.
 std::string correlation_chart(const PageScene& scene, std::uint32_t lens, const std::string& name,
                               const Covariance& known);
 

@@ -12,9 +12,11 @@
 
 namespace sheaf {
 
+struct PhotometricPart;
+
 /// What a report is made from beside the two states (docs/report.md).
 struct ReportOptions {
-  std::string title;               ///< heading, and title of the page; empty: "Adjustment"
+  std::string title{};             ///< heading, and title of the page; empty: "Adjustment"
   std::filesystem::path images{};  ///< folder of the images, for thumbnails; empty: none
   std::string summary{};           ///< text of `solve --json`; empty: nothing is told of a run
   std::string summary_name = "summary";  ///< what messages call it
@@ -26,7 +28,8 @@ struct ReportOptions {
   /// Both states are in a frame that means something, such as a survey's: the start is not moved
   /// onto the result before they are compared.
   bool in_place = false;
-  int threads = 0;  ///< 0: all
+  int threads = 0;                               ///< 0: all
+  const PhotometricPart* photometric = nullptr;  ///< of a refinement by pixels; null: none
 };
 
 /// A report as one page of HTML that needs nothing beside it: no file, no network. before: the

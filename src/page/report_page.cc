@@ -18,6 +18,7 @@
 #include "page/lens_section.h"
 #include "page/page_assets.h"
 #include "page/page_scene.h"
+#include "page/photometric_section.h"
 #include "page/report.h"
 #include "page/residual_charts.h"
 #include "page/run_record.h"
@@ -28,6 +29,7 @@
 #include "page/survey_section.h"
 #include "page/thumbnails.h"
 #include "page/verdict.h"
+#include "platform/parallel.h"
 #include "scene/rigs.h"
 #include "sheaf/survey.h"
 
@@ -65,15 +67,16 @@ std::string script_hash(const std::string& script) {
 std::string counts_html(const Problem& problem) {
   const std::size_t lenses = problem.cameras.size();
   std::string out = count_text(problem.num_images(), "image", "images");
-  if (lenses > 0)
+  if (lenses > 0 && problem.num_observations() > 0)
     out += lenses == problem.num_images() && lenses > 1 ? ", a lens each"
            : lenses == 1                                ? ", one lens"
                          : ", " + count_text(lenses, "lens", "lenses");
   if (!problem.rigs.empty())
     out += ", " + count_text(problem.rigs.num_frames(), "frame", "frames") + " of " +
            count_text(problem.rigs.count, "rig", "rigs");
-  return out + ", " + count_text(problem.num_points(), "point", "points") + ", " +
-         count_text(problem.num_observations(), "observation", "observations");
+  out += ", " + count_text(problem.num_points(), "point", "points");
+  if (problem.num_observations() == 0) return out;
+  return out + ", " + count_text(problem.num_observations(), "observation", "observations");
 }
 
 /// Halves of a sentence, so that lines break between them.
@@ -93,8 +96,8 @@ std::string colours_html(const PageScene& scene, bool sigmas) {
            (checked ? " checked" : "") + "><span>" + text + "</span></label>";
   };
   if (own) choice("rgb", "own", true);
-  choice("err", "error", !own);
-  choice("trk", "track length", false);
+  if (!own || scene.after.counted > 0) choice("err", "error", !own);
+  if (scene.after.counted > 0) choice("trk", "track length", false);
   if (sigmas) choice("sig", "σ", false);
   return out;
 }
@@ -213,7 +216,7 @@ std::string note_html(const PageScene& scene, const SceneView& view, const Scene
            " drawn: those that are off, and a fair sample. ";
   if (view.far > 0)
     out += count_text(view.far, "point lies", "points lie") + " further out than drawn. ";
-  if (!scene.sizes_known)
+  if (!scene.sizes_known && scene.after.counted > 0)
     out += "The files state no image sizes: frames are as far as measurements reach. ";
   return out;
 }
@@ -222,6 +225,9 @@ std::string sections(const PageScene& scene, const Problem& result, const PageFa
                      const ReportOptions& options) {
   const RunRecord* run = facts.run;
   std::string out = residual_section(scene);
+  if (options.photometric != nullptr)
+    out += section("patches", "Patches", photometric_words(*options.photometric),
+                   photometric_section(*options.photometric));
   out += section("lenses", "Lenses", lens_words(scene), lens_section(scene, facts.covariance));
   if (run != nullptr && run->survey)
     out += section("survey", "Survey", survey_words(*run->survey), survey_section(*run->survey));
@@ -250,11 +256,18 @@ Result<std::string> report_page(const Problem* before, const Problem& after,
     run = std::move(read).value();
   }
   const bool placed = run && run->survey;
-  const Result<PageScene> made = page_scene(before, after, {options.in_place, options.threads});
+  // What is wrong is looked for while the scene is made.
+  std::optional<Result<PageScene>> found;
+  std::vector<Finding> findings;
+  Threads(options.threads).for_each(2, [&](std::size_t task) {
+    if (task == 0) found = page_scene(before, after, {options.in_place, options.threads});
+    if (task == 1 && after.num_observations() > 0) findings = check(after);
+  });
+  const Result<PageScene>& made = *found;
   if (!made.ok()) return made.error();
   const PageScene& scene = made.value();
   const std::optional<Covariance> known = known_precision(after, options);
-  PageFacts facts{run ? &*run : nullptr, known ? &*known : nullptr, check(after)};
+  PageFacts facts{run ? &*run : nullptr, known ? &*known : nullptr, std::move(findings)};
   const SceneView view =
       scene_view(scene, placed ? Vector3<double>{0, 0, 1} : Vector3<double>{0, 0, 0});
   const std::vector<double> sigmas = known ? point_sigmas(*known) : std::vector<double>();
@@ -275,8 +288,8 @@ Result<std::string> report_page(const Problem* before, const Problem& after,
                  {"FIGURES", words.figures},
                  {"COLOURS", colours_html(scene, !sigmas.empty())},
                  {"STARTLESS", none},
-                 {"RMS_BEFORE", scene.has_start ? with_unit(scene.before.rms, "px") : ""},
-                 {"RMS_AFTER", with_unit(scene.after.rms, "px")},
+                 {"RMS_BEFORE", scene.before.counted > 0 ? with_unit(scene.before.rms, "px") : ""},
+                 {"RMS_AFTER", scene.after.counted > 0 ? with_unit(scene.after.rms, "px") : ""},
                  {"NOTE", note_html(scene, view, pack.value())},
                  {"SECTIONS", sections(scene, after, facts, options)},
                  {"META", meta_script(scene, after, view, facts.run, pack.value())},

@@ -121,7 +121,7 @@ void label_line(Plot& plot, const Tail& tail, double share, const std::string& t
 std::string share_words(double share) {
   const int power = static_cast<int>(std::lround(std::log10(share)));
   if (power == 0) return "all";
-  if (power >= -3) return percent(share, 1);
+  if (power >= -4) return percent(share, 1);
   return "1 in " + tick_text(std::pow(10.0, -power));
 }
 

@@ -155,6 +155,7 @@ Result<RunRecord> read_run(const std::string& json, const std::string& name) {
                      ": found no \"termination\" and \"iterations\", expected the JSON of "
                      "'sheaf solve --json'");
   RunRecord run;
+  if (find(value, {"rms_grey"}) != nullptr) run.unit = "grey levels";
   run.version = text(value, {"version"});
   run.command = text(value, {"command"});
   run.path = text(value, {"input", "path"});

@@ -41,6 +41,7 @@ struct RunSurvey {
 /// What the JSON of `solve` says of a run. Texts are empty and numbers NaN where it does not say.
 struct RunRecord {
   std::string version, command;
+  std::string unit = "px";  ///< of residuals
   std::string path, format, sha256;
   double bytes = 0;
   std::vector<std::pair<std::string, std::string>> options;  ///< key, value as text

@@ -41,16 +41,19 @@ std::vector<std::uint8_t> shrunk(const Raster& raster, int width, int height) {
   return out;
 }
 
+std::string encoded(const Raster& of, int longest, int quality) {
+  const double scale = std::min(1.0, double(longest) / std::max(of.width, of.height));
+  const int width = std::max(1, static_cast<int>(std::lround(of.width * scale)));
+  const int height = std::max(1, static_cast<int>(std::lround(of.height * scale)));
+  return base64(encode_grey_jpeg(shrunk(of, width, height), width, height, quality));
+}
+
 std::string thumbnail(const std::filesystem::path& path, int longest, int quality) {
   const Result<std::string> bytes = bytes_of(path);
   if (!bytes.ok()) return "";
   const Result<Raster> raster = decode_image(bytes.value(), path.string());
   if (!raster.ok()) return "";
-  const Raster& of = raster.value();
-  const double scale = std::min(1.0, double(longest) / std::max(of.width, of.height));
-  const int width = std::max(1, static_cast<int>(std::lround(of.width * scale)));
-  const int height = std::max(1, static_cast<int>(std::lround(of.height * scale)));
-  return base64(encode_grey_jpeg(shrunk(of, width, height), width, height, quality));
+  return encoded(raster.value(), longest, quality);
 }
 
 std::filesystem::path found(const std::filesystem::path& folder, const std::string& name) {
@@ -62,6 +65,16 @@ std::filesystem::path found(const std::filesystem::path& folder, const std::stri
 }
 
 }  // namespace
+
+std::string grey_thumbnail(const GreyImage& grey) {
+  if (grey.width <= 0 || grey.height <= 0) return "";
+  Raster raster;
+  raster.width = grey.width;
+  raster.height = grey.height;
+  for (const float level : grey.pixels)
+    raster.samples.push_back(static_cast<std::uint16_t>(std::clamp(level + 0.5f, 0.0f, 255.0f)));
+  return encoded(raster, kLarge_px, kLargeQuality);
+}
 
 Thumbnails thumbnails(const PageScene& scene, const Problem& named,
                       const std::filesystem::path& folder, int threads) {

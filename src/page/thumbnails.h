@@ -8,6 +8,7 @@
 #include <string>
 
 #include "page/page_scene.h"
+#include "sheaf/photometric.h"
 
 namespace sheaf {
 
@@ -19,5 +20,8 @@ using Thumbnails = std::map<std::uint32_t, std::string>;
 /// read are left out.
 Thumbnails thumbnails(const PageScene& scene, const Problem& named,
                       const std::filesystem::path& folder, int threads);
+
+/// An image that is in memory, likewise.
+std::string grey_thumbnail(const GreyImage& grey);
 
 }  // namespace sheaf

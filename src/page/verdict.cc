@@ -31,8 +31,10 @@ std::string sentence(const std::string& text) {
 }
 
 /// Findings say what is wrong and, behind a colon or semicolon, what it means and what to do.
-Reason reason_of(const Finding& finding) {
-  const Weight weight = finding.grave ? Weight::wrong : Weight::look;
+/// One of thousands of observations that is wrong leaves the result what it is.
+Reason reason_of(const Finding& finding, std::uint64_t observations) {
+  const bool few = finding.of == "observations" && finding.count * 1000 <= observations;
+  const Weight weight = finding.grave && !few ? Weight::wrong : Weight::look;
   const std::string& words = finding.words;
   const std::size_t colon = words.find(": "), semicolon = words.find("; ");
   const std::size_t at = colon != std::string::npos ? colon : semicolon;
@@ -190,7 +192,8 @@ std::string key_figures(const PageScene& scene, const Covariance* known) {
 
 Verdict verdict(const PageScene& scene, const PageFacts& facts) {
   std::vector<Reason> reasons;
-  for (const Finding& finding : facts.findings) reasons.push_back(reason_of(finding));
+  for (const Finding& finding : facts.findings)
+    reasons.push_back(reason_of(finding, scene.order.size()));
   if (facts.run != nullptr && facts.run->survey) add_survey(*facts.run->survey, reasons);
   if (const auto end = ending(facts.run)) reasons.push_back(*end);
   const bool told_far = std::any_of(facts.findings.begin(), facts.findings.end(),

@@ -87,6 +87,7 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--seed",
                     "--anchor",
                     "--anchor-loss",
+                    "--report",
                     "--rows"});
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
