@@ -20,7 +20,7 @@ LOSSES = ("huber:2", "soft-l1:2", "cauchy:2", "tukey:6", "geman-mcclure:6")
 ROUNDS = ("huber:auto", "cauchy:auto", "tukey:auto:gnc", "geman-mcclure:auto:gnc", "tukey:6:gnc")
 MODELS = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV",
           "OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "FOV",
-          "EUCM")
+          "EUCM", "RAD_TAN_THIN_PRISM_FISHEYE", "DIVISION", "EQUIRECTANGULAR", "DOUBLE_SPHERE")
 
 
 class Commands:
