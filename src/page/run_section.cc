@@ -141,15 +141,18 @@ std::string facts_of(const RunRecord& run) {
                              (run.recoveries > 0 ? "; " + count_text(std::size_t(run.recoveries),
                                                                      "recovery", "recoveries")
                                                  : ""));
-  out += fact("Cost",
-              digits(run.initial_cost, 5) + " → " + digits(run.final_cost, 5) + kThinSpace + run.unit + "²");
+  out += fact("Cost", digits(run.initial_cost, 5) + " → " + digits(run.final_cost, 5) + kThinSpace +
+                          run.unit + "²");
   if (!run.loss.empty())
-    out += fact("Loss", escaped(run.loss) + (std::isfinite(run.loss_scale_px)
-                                                 ? ", scale " + with_unit(run.loss_scale_px, run.unit.c_str())
-                                                 : ""));
+    out += fact("Loss", escaped(run.loss) +
+                            (std::isfinite(run.loss_scale_px)
+                                 ? ", scale " + with_unit(run.loss_scale_px, run.unit.c_str())
+                                 : ""));
   if (!run.solver.empty())
-    out += fact("Solver", escaped(run.solver + ", " + (run.precision.empty() ? "" : run.precision + ", ") + run.simd + ", ") +
-                              count_text(std::size_t(run.threads), "thread", "threads"));
+    out += fact("Solver",
+                escaped(run.solver + ", " + (run.precision.empty() ? "" : run.precision + ", ") +
+                        run.simd + ", ") +
+                    count_text(std::size_t(run.threads), "thread", "threads"));
   if (!run.reason.empty()) out += fact("Why", escaped(run.reason));
   if (std::isfinite(run.total_s))
     out += fact("Time", seconds_text(run.total_s) + ": reading " + seconds_text(run.read_s) +
@@ -211,11 +214,12 @@ std::string run_words(const RunRecord& run) {
 std::string run_section(const RunRecord& run) {
   const std::string cost =
       chart("Cost", "½ Σ r², " + run.unit + "²; hollow: refused", costs_of(run), rejected_of(run));
-  const std::string gradient =
-      chart("Gradient", "largest, " + run.unit + ", of the state after each step", gradients_of(run));
+  const std::string gradient = chart(
+      "Gradient", "largest, " + run.unit + ", of the state after each step", gradients_of(run));
   const std::string change = chart("Step", "largest relative change of any block", changes_of(run));
   const std::string scale =
-      !changes_scale(run) ? "" : chart("Scale of the loss", run.unit + ", in each step", scales_of(run));
+      !changes_scale(run) ? ""
+                          : chart("Scale of the loss", run.unit + ", in each step", scales_of(run));
   const std::string switching =
       cost.empty()
           ? ""
