@@ -37,6 +37,19 @@ class Scenes(unittest.TestCase):
 
 
 class Reports(unittest.TestCase):
+    def test_report_is_one_page(self):
+        start, truth = scenes.small()
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "report.html"
+            truth.report(path, before=start, title="<b>A title</b>")
+            page = path.read_text(encoding="utf-8")
+            self.assertIn("<h1>&lt;b&gt;A title", page)
+            self.assertIn('>before <span>', page)
+            truth.report(path)
+            self.assertNotIn("<h1>&lt;b&gt;A title", path.read_text(encoding="utf-8"))
+            with self.assertRaisesRegex(sheaf.Error, "nothing.json"):
+                truth.report(path, summary=pathlib.Path(folder) / "nothing.json")
+
     def test_evaluate_align_and_check(self):
         start, truth = scenes.small()
         sheaf.solve(start)

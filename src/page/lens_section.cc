@@ -323,7 +323,7 @@ std::string tables(const PageScene& scene, const std::vector<LensUse>& uses,
   std::string out;
   if (uses.size() <= kFewLenses) {
     for (const LensUse& use : uses) out += lens_table(scene, use, known);
-    return "<div class=\"lenses\">" + out + "</div>";
+    return scrolling("Parameters of the lenses", "<div class=\"lenses\">" + out + "</div>");
   }
   std::map<CameraModel, std::vector<const LensUse*>> models;
   for (const LensUse& use : uses) models[scene.result.cameras[use.lens].model].push_back(&use);

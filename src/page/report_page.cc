@@ -89,7 +89,10 @@ std::string headline_html(const std::string& text) {
 
 std::string colours_html(const PageScene& scene, bool sigmas) {
   const SceneMetadata* known = scene.result.metadata.get();
-  const bool own = known != nullptr && !known->point_colours.empty();
+  // Files that know no colours have one for all.
+  bool own = false;
+  if (known != nullptr)
+    for (const auto& colour : known->point_colours) own |= colour != known->point_colours.front();
   std::string out;
   const auto choice = [&](const char* value, const char* text, bool checked) {
     out += std::string("<label><input type=\"radio\" name=\"col\" value=\"") + value + "\"" +

@@ -126,7 +126,7 @@ std::string axis_chart(const RunSurvey& survey) {
       for (std::size_t k = 0; k < 3; ++k)
         if (r.sigma[k] > 0) most = std::max(most, std::abs(r.residual[k] / r.sigma[k]));
   most = std::min(1.05 * most, 12.0);
-  Plot plot({-most, most}, {0, 1}, {.height = 210, .left = 64});
+  Plot plot({-most, most}, {0, 1}, {.height = 210, .left = 84});
   plot.raw("<rect x=\"" + coordinate(plot.x(-1)) + "\" y=\"12\" width=\"" +
            coordinate(plot.x(1) - plot.x(-1)) + "\" height=\"164\" class=\"fill\"/>");
   plot.axis_x(round_ticks(-most, most, 6), "σ");
@@ -154,7 +154,7 @@ std::string axis_chart(const RunSurvey& survey) {
 }
 
 std::string table_of(const RunSurvey& survey, const Kind& kind) {
-  constexpr std::size_t kMost = 60;
+  constexpr std::size_t kMost = 20;
   if (kind.list->empty()) return "";
   std::string body, head;
   for (std::size_t k = 0; k < 3; ++k) head += std::string("<th>") + axes_of(survey)[k] + "</th>";

@@ -59,7 +59,7 @@ std::optional<Reason> tail(const PageScene& scene) {
 }
 
 /// What covariances say: directions that measurements leave open, and how well the rest is known.
-void add_precision(const Covariance& known, std::vector<Reason>& reasons) {
+void add_precision(const Covariance& known, bool surveyed, std::vector<Reason>& reasons) {
   constexpr std::size_t kShown = 2;
   if (!known.weak.empty()) {
     std::string words;
@@ -75,7 +75,8 @@ void add_precision(const Covariance& known, std::vector<Reason>& reasons) {
                        count_text(known.undetermined_points, "point is", "points are") +
                            " not determined by what is measured",
                        "leave them out (convert --min-track 2, --min-angle)"});
-  if (known.deficit < 7) return;
+  // A survey has left the problem by now, and with it what fixes the rest.
+  if (known.deficit < 7 || surveyed) return;
   reasons.push_back({Weight::sound,
                      "where the scene lies, how it is turned and how large it is rests on no "
                      "measurement",
@@ -85,11 +86,14 @@ void add_precision(const Covariance& known, std::vector<Reason>& reasons) {
 
 void add_survey(const RunSurvey& survey, std::vector<Reason>& reasons) {
   std::size_t blunders = 0;
+  double most = 0;
   std::string worst;
   for (const auto* list : {&survey.positions, &survey.control, &survey.check})
     for (const RunSurveyResidual& r : *list)
       if (r.blunder) {
-        if (worst.empty()) worst = r.name + " is off by " + digits(r.worst_sigmas) + " sigmas";
+        if (r.worst_sigmas > most)
+          worst = r.name + " is off by " + digits(r.worst_sigmas) + " sigmas";
+        most = std::max(most, r.worst_sigmas);
         ++blunders;
       }
   if (blunders > 0)
@@ -200,7 +204,8 @@ Verdict verdict(const PageScene& scene, const PageFacts& facts) {
                                     [](const Finding& f) { return f.code == "far-off"; });
   if (!told_far)
     if (const auto found = tail(scene)) reasons.push_back(*found);
-  if (facts.covariance != nullptr) add_precision(*facts.covariance, reasons);
+  if (facts.covariance != nullptr)
+    add_precision(*facts.covariance, facts.run != nullptr && facts.run->survey, reasons);
   std::stable_sort(reasons.begin(), reasons.end(),
                    [](const Reason& a, const Reason& b) { return a.weight > b.weight; });
   Verdict out{headline(facts.run, reasons), "", key_figures(scene, facts.covariance)};
