@@ -165,8 +165,8 @@ TEST(Floors, QuotedIncludesAreOurs) {
 
 TEST(Floors, PublicHeadersShowOnlyTheStandardLibrary) {
   const auto headers = read_sources({"include"}, {".h"});
-  // The last one is solver.h: what stays between solves and what slides are called by programs of
-  // another kind than those that solve a file once.
+  // The seventeenth is solver.h: solving again and sliding on is another business than solving
+  // once.
   EXPECT_LE(headers.size(), 17u);
   for (const SourceFile& file : headers) {
     for (const Include& include : includes_of(file)) {

@@ -18,17 +18,33 @@ void add_slices(Buffer<double>& sums, std::size_t slices, Threads& threads) {
   });
 }
 
-int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
-  constexpr double kFlopsPerSlice = 15e6, kBytes = 96e6;
-  const double sums = 8.0 * (kTileDoubles * static_cast<double>(tiles) +
-                             kDiagonalDoubles * static_cast<double>(images));
-  // Sums that stay in the second-level cache cost next to nothing: small scenes have slices too, so
-  // that several threads are of use to them.
+namespace {
+
+/// Slices of a scene whose sums stay in the second-level cache, where they cost next to nothing: so
+/// that several threads are of use to it too.
+double few_slices(double flops, double sum_bytes) {
   constexpr double kFewFlops = 3e6, kCheapBytes = 128e3, kMostFew = 8;
-  const double few = sums < kCheapBytes ? std::min(kMostFew, flops / kFewFlops) : 0;
-  return std::max(
-      1, static_cast<int>(std::min(
-             {double(kMostSlices), std::max(few, flops / kFlopsPerSlice), kBytes / sums})));
+  return sum_bytes < kCheapBytes ? std::min(kMostFew, flops / kFewFlops) : 0;
+}
+
+double bytes_of_sums(std::uint64_t tiles, std::uint64_t images) {
+  return 8.0 * (kTileDoubles * static_cast<double>(tiles) +
+                kDiagonalDoubles * static_cast<double>(images));
+}
+
+constexpr double kFlopsPerSlice = 15e6;
+
+}  // namespace
+
+int count_slices(double flops, std::uint64_t tiles, std::uint64_t images) {
+  constexpr double kBytes = 96e6;
+  const double sums = bytes_of_sums(tiles, images);
+  const double slices = std::max(few_slices(flops, sums), flops / kFlopsPerSlice);
+  return std::max(1, static_cast<int>(std::min({double(kMostSlices), slices, kBytes / sums})));
+}
+
+bool is_small(double flops, std::uint64_t tiles, std::uint64_t images) {
+  return few_slices(flops, bytes_of_sums(tiles, images)) > flops / kFlopsPerSlice;
 }
 
 }  // namespace sheaf

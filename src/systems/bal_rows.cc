@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include "eliminate/lens_kernels.h"
+#include "lists/block_layout.h"
 #include "lists/slices.h"
 
 namespace sheaf {
@@ -18,9 +20,23 @@ BalRows::BalRows(const Arrangement& arrangement, std::vector<std::uint32_t> imag
       image_camera_(std::move(image_camera)),
       columns_(arrangement.columns),
       kernels_(kernels),
+      pairs_(has_poses_alone() &&
+                     is_small(linearize_flops(batches_.num_batches(), chunks_.pairs.size()),
+                              chunks_.tiles.size(), image_camera_.size())
+                 ? lens_kernels(kernels.name).pose_pairs
+                 : kernels.pairs),
       threads_(threads) {
   held_.allocate(kCameraRecord * image_camera_.size());
   tried_.allocate(kCameraRecord * image_camera_.size());
+}
+
+/// Windows have their intrinsics held. Sums of six columns have another order than those of nine,
+/// and larger scenes keep theirs.
+bool BalRows::has_poses_alone() const {
+  for (std::size_t i = 0; i < columns_.num_images(); ++i)
+    for (int k = 6; k < 9; ++k)
+      if (columns_.image(i)[k] >= 0) return false;
+  return true;
 }
 
 void BalRows::attach(const SteppedState& state) {
@@ -53,7 +69,7 @@ Records BalRows::eliminate(const Elimination& of, std::uint32_t c, double* scrat
   const Records records = records_in(scratch, chunks_);
   kernels_.linearize(in, chunk, records, out);
   kernels_.diagonal(batches_, chunks_, chunk, records, diagonal);
-  kernels_.pairs(chunks_, chunk, records, tiles);
+  pairs_(chunks_, chunk, records, tiles);
   return records;
 }
 

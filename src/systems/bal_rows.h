@@ -43,12 +43,14 @@ class BalRows : public PointRows {
  private:
   void write_records(const CameraState& cameras, Buffer<double>& records) const;
   BalState held_state();
+  bool has_poses_alone() const;
 
   const Batches& batches_;
   const Chunks& chunks_;
   const std::vector<std::uint32_t> image_camera_;
   const Columns& columns_;
   const Kernels& kernels_;
+  void (*const pairs_)(const Chunks&, const Chunk&, const Records&, double* tiles);
   Threads& threads_;
   const SteppedState* state_ = nullptr;
   Buffer<double> held_, tried_;  ///< kCameraRecord per image

@@ -16,7 +16,14 @@
 #include "solve/scenes.h"
 
 // Sanitizers have allocators of their own, and other systems other calls.
-#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SHEAF_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SHEAF_SANITIZED 1
+#endif
+#endif
+#if defined(__linux__) && !defined(SHEAF_SANITIZED)
 #define SHEAF_COUNTS_ALLOCATIONS 1
 #include <sys/mman.h>
 #include <sys/syscall.h>
