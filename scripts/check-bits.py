@@ -33,7 +33,7 @@ sys.dont_write_bytecode = True
 from bits.commands import Command, all_commands  # noqa: E402
 
 # Keys of the JSON that differ between machines, builds or runs.
-UNSTEADY = {"version", "time", "memory", "simd", "threads", "time_s", "time_to", "solve_s",
+UNSTEADY = {"version", "command", "time", "memory", "simd", "threads", "time_s", "time_to", "solve_s",
             "setup_s", "total_s", "cpu_percent", "peak_bytes", "seconds_per_iteration",
             "seconds_per_accepted", "seconds_per_rejected"}
 

@@ -79,14 +79,30 @@ std::vector<std::string> images_without_patches(const PhotometricFolder& folder,
   return out;
 }
 
+// A checkpoint that is gone on from may be the one that is written.
+PhotometricOutputs outputs_for(const Arguments& arguments) {
+  const PhotometricOptions& options = arguments.photometric.options;
+  return PhotometricOutputs(
+      arguments.outputs, {{"--json", arguments.common.json}, {"--checkpoint", options.checkpoint}},
+      {arguments.in, arguments.photometric.read.images.string(),
+       options.resume != options.checkpoint ? options.resume : ""});
+}
+
+void say(const std::string& in, const PhotometricFolder& folder, const PhotometricSummary& summary,
+         const PhotometricDetails& details) {
+  print_out("{}: {} images, {} points\n", in, folder.problem.images.size(),
+            folder.problem.num_points());
+  for (const std::string& note : folder.notes) print_out("note        {}\n", note);
+  for (const std::string& image : images_without_patches(folder, details))
+    print_out("note        no patch is seen in image {}: nothing holds its pose\n", image);
+  print_text(summary_text(summary, details));
+}
+
 int run(Arguments& arguments) {
   const Timer total;
   Interrupt interrupt(arguments.common.quiet);
   PhotometricOptions options = arguments.photometric.options;
-  PhotometricOutputs outputs(
-      arguments.outputs, {{"--json", arguments.common.json}, {"--checkpoint", options.checkpoint}},
-      {arguments.in, arguments.photometric.read.images.string(),
-       options.resume != options.checkpoint ? options.resume : ""});
+  PhotometricOutputs outputs = outputs_for(arguments);
   interrupt.limit(options.time_limit_s);
   PhotometricFolder folder = read_photometric(arguments.in, arguments.photometric.read).value();
   std::optional<PoseErrors> before, after;
@@ -115,12 +131,7 @@ int run(Arguments& arguments) {
   const PhotometricDetails details = examine_photometric(problem, options).value();
   if (summary.solve.usable()) outputs.write(folder, details, options);
   const double write_s = writing.seconds();
-  print_out("{}: {} images, {} points\n", arguments.in, problem.images.size(),
-            problem.num_points());
-  for (const std::string& note : folder.notes) print_out("note        {}\n", note);
-  for (const std::string& image : images_without_patches(folder, details))
-    print_out("note        no patch is seen in image {}: nothing holds its pose\n", image);
-  print_text(summary_text(summary, details));
+  say(arguments.in, folder, summary, details);
   if (before)
     print_out("poses       {:.4g} -> {:.4g} rad, centres {:.4g} -> {:.4g} from those given\n",
               before->rotation_rad, after->rotation_rad, before->center, after->center);

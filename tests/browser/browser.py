@@ -120,7 +120,7 @@ class Browser:
     def open(self, path):
         self.requests, self.said = [], []
         self.call("Page.navigate", url="file://" + os.path.abspath(path))
-        self.wait("document.readyState === 'complete' && document.documentElement.dataset.ready === '1'")
+        self.wait("document.readyState === 'complete' && document.documentElement.dataset.ready === '1'", 120)
 
     def key(self, name):
         text = name if len(name) == 1 else {"Enter": "\r"}.get(name, "")

@@ -157,10 +157,10 @@ async function spin(seconds) {
   const t0 = performance.now(), pixel = new Uint8Array(4), gl = renderer.gl;
   let k = 0;
   while (performance.now() - t0 < seconds * 1000) {
-    await new Promise(requestAnimationFrame);
     orbit.turn(0.02, 0);
     T = meta.start ? 0.5 + 0.5 * Math.sin(k / 20) : 1;
-    frame();
+    draw();
+    await new Promise(requestAnimationFrame);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     k++;
   }

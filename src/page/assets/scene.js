@@ -165,7 +165,7 @@ function buildMarks() {
 }
 
 // ---- drawing
-let wanted = false, budget = Infinity, last = 0, still = 0;
+let wanted = false, budget = 40000, asked = 0, still = 0;
 function render(count) {
   orbit.update();
   const dpr = Math.min(2, devicePixelRatio || 1);
@@ -178,15 +178,13 @@ function draw(now) {
   if (now === true) return render(Infinity);
   if (wanted) return;
   wanted = true;
+  asked = performance.now();
   requestAnimationFrame(() => { wanted = false; frame(); });
 }
 function frame() {
-  const t = performance.now(), dt = t - last;
-  last = t;
-  if (dt < 500) {
-    if (budget === Infinity) budget = meta.points;
-    budget = Math.max(3000, Math.min(meta.points, budget * Math.max(0.6, Math.min(1.25, 36 / dt))));
-  }
+  // A frame that is asked for waits until the one before is drawn: how long, says what it cost.
+  const dt = Math.max(1, performance.now() - asked);
+  budget = Math.max(3000, Math.min(meta.points, budget * Math.max(0.3, Math.min(1.25, 36 / dt))));
   render(Math.round(Math.min(budget, meta.points)));
   clearTimeout(still);
   if (budget < meta.points) still = setTimeout(() => draw(true), 180);
