@@ -204,7 +204,8 @@ std::array<int, 2> cells_of(const ImageFrame& frame, int most) {
 
 std::string cell_charts(const PageScene& scene) {
   const double ratio = proportion(scene);
-  const auto [columns, rows] = cells_of({{}, {1, ratio}}, 18);
+  const std::array<int, 2> cells = cells_of({{}, {1, ratio}}, 18);
+  const int columns = cells[0], rows = cells[1];
   MapPlace place;
   place.height = ratio > 1.05 ? 280 : std::min(360 * ratio, 276.0);
   place.width = std::min(360.0, place.height / ratio);
