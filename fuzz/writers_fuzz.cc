@@ -33,7 +33,7 @@ void require(bool condition, const std::string& what) {
 double number(FuzzedDataProvider& from) {
   switch (from.ConsumeIntegralInRange(0, 4)) {
     case 0:
-      return from.ConsumeFloatingPoint<double>();
+      return from.ConsumeFloatingPointInRange<double>(-1e60, 1e60);
     case 1:
       return from.ConsumeIntegralInRange(-9, 9);
     default:
@@ -55,7 +55,7 @@ sheaf::Camera lens(FuzzedDataProvider& from) {
 sheaf::Problem problem_of(FuzzedDataProvider& from) {
   sheaf::Problem problem;
   auto metadata = std::make_shared<sheaf::SceneMetadata>();
-  const int lenses = from.ConsumeIntegralInRange(1, 3), images = from.ConsumeIntegralInRange(0, 4);
+  const int lenses = from.ConsumeIntegralInRange(1, 3), images = from.ConsumeIntegralInRange(1, 4);
   for (int c = 0; c < lenses; ++c) problem.cameras.push_back(lens(from));
   const bool named = from.ConsumeBool(), numbered = from.ConsumeBool(),
              coloured = from.ConsumeBool();
@@ -71,7 +71,7 @@ sheaf::Problem problem_of(FuzzedDataProvider& from) {
     if (named) metadata->image_names.push_back(from.ConsumeRandomLengthString(12));
     if (numbered) metadata->image_ids.push_back(from.ConsumeIntegral<std::uint32_t>() % 8);
   }
-  const int points = from.ConsumeIntegralInRange(0, 5);
+  const int points = from.ConsumeIntegralInRange(1, 5);
   for (int i = 0; i < points; ++i) {
     problem.add_point(number(from), number(from), number(from));
     if (coloured) metadata->point_colours.push_back({1, 2, 3});

@@ -61,6 +61,7 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
   if (camera.width_px == 0 || camera.height_px == 0)
     return refuse("its images' size is not known, which focal lengths count by");
   const auto& k = camera.parameters;
+  if (!(k[0] > 0)) return refuse("its focal length is not above 0");
   Intrinsics out;
   if (camera.model == CameraModel::opencv_fisheye || camera.model == CameraModel::fov) {
     out.lens = {k[0], k[1], k[2], k[3], {}, {}};

@@ -33,12 +33,17 @@ Result<LibmvLens> libmv_lens(const Camera& camera) {
 
 struct Writer {
   std::string out;
+  bool overflows = false;  ///< a number is beyond single precision
 
   void word(std::uint32_t bits) {
     for (int shift = 0; shift < 32; shift += 8) out += static_cast<char>(bits >> shift & 0xff);
   }
   void integer(std::uint64_t value) { word(static_cast<std::uint32_t>(value)); }
-  void real(double value) { word(std::bit_cast<std::uint32_t>(static_cast<float>(value))); }
+  void real(double value) {
+    const bool fits = std::abs(value) <= double(std::numeric_limits<float>::max());
+    overflows = overflows || !fits;
+    word(std::bit_cast<std::uint32_t>(fits ? static_cast<float>(value) : 0.0F));
+  }
 };
 
 void put_image(const Problem& problem, std::size_t j, bool as_read, Writer& writer) {
@@ -90,6 +95,7 @@ Result<std::string> format_libmv(const Problem& given) {
     writer.real(problem.observation_xy[2 * i]);
     writer.real(problem.observation_xy[2 * i + 1]);
   }
+  if (writer.overflows) return refuse("hold single precision, and a number is beyond its range");
   return std::move(writer.out);
 }
 

@@ -209,6 +209,9 @@ Result<std::string> format_nvm(const Problem& given) {
                                          std::string(to_string(given.cameras[c].model)) +
                                          " with distortion or two focal lengths; NVM has no lens "
                                          "but the pinhole");
+    if (!(view->f > 0))
+      return Error(ErrorCode::usage, "camera " + std::to_string(c) +
+                                         " has no focal length above 0, which NVM asks for");
   }
   const SceneMetadata* metadata = problem.metadata.get();
   const SourceFiles* source = metadata && metadata->source && metadata->source->format == "nvm"

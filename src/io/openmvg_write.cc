@@ -46,6 +46,7 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
       return refuse("its panoramas are twice as wide as high, and have the size of their images");
     return Intrinsics{"spherical", nullptr, 0, 0, 0, {}};
   }
+  if (!(k[0] > 0)) return refuse("its focal length is not above 0");
   if (camera.model == CameraModel::opencv_fisheye) {
     if (k[0] != k[1]) return two_focals();
     return Intrinsics{"fisheye", "fisheye", k[0], k[2], k[3], {k.begin() + 4, k.begin() + 8}};
