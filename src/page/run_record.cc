@@ -74,9 +74,15 @@ std::string option_text(const JsonValue& value) {
   return "";
 }
 
+/// 0 where there is none, or none that can be counted.
+int count(const JsonValue& value, const char* key) {
+  const double found = number(value, {key});
+  return found >= 0 && found < 1e9 ? static_cast<int>(found) : 0;
+}
+
 RunStep step_of(const JsonValue& value) {
   RunStep step;
-  step.index = static_cast<int>(number(value, {"index"}));
+  step.index = count(value, "index");
   step.cost = number(value, {"cost"});
   step.trial_cost = number(value, {"trial_cost"});
   step.gradient = number(value, {"gradient_max"});
@@ -132,7 +138,7 @@ void read_work(const JsonValue& json, RunRecord& run) {
   run.precision = text(json, {"precision"});
   run.simd = text(json, {"simd"});
   const double threads = number(json, {"threads"});
-  run.threads = std::isfinite(threads) ? static_cast<int>(threads) : 0;
+  run.threads = threads >= 0 && threads < 1e9 ? static_cast<int>(threads) : 0;
   run.forecast_bytes = number(json, {"memory", "forecast_bytes"});
   run.peak_bytes = number(json, {"memory", "peak_bytes"});
   run.read_s = number(json, {"time", "read_s"});

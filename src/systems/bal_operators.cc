@@ -118,7 +118,7 @@ void FloatBalOperator::write_step(const double* x, double scale, std::size_t ima
   double step[9];
   camera_record::write_step(state_.cameras->data() + kCameraRecord * image + camera_record::kFocal,
                             x, step);
-  double* rho = step + camera_record::kRho - camera_record::kStep;
+  double* rho = step + (camera_record::kRho - camera_record::kStep);
   for (int k = 0; k < 3; ++k) rho[k] = scale_ * rho[k];
   float* to = &cameras_[kFloatCameraRecord * image + camera_record::kStep];
   for (int k = 0; k < 9; ++k) to[k] = static_cast<float>(scale * step[k]);

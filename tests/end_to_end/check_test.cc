@@ -57,7 +57,7 @@ TEST_F(CheckCommand, NamesLensesWithoutImagesAndPoints) {
   });
   ASSERT_NE(found, findings.end());
   const json& finding = *found;
-  EXPECT_EQ(finding["first"], json({0}));
+  EXPECT_EQ(finding["first"], json::array({0}));
   EXPECT_TRUE(finding["images"].empty() && finding["points"].empty());
 }
 
