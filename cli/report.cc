@@ -13,6 +13,7 @@
 #include "io/folder_files.h"
 #include "json_document.h"
 #include "outputs.h"
+#include "read_input.h"
 #include "sheaf/sheaf.h"
 #include "summary_text.h"
 #include "terminal.h"
@@ -56,9 +57,9 @@ void write_page(const Arguments& arguments, const std::string& out) {
   const Timer total;
   const std::string& json = arguments.common.json;
   const bool two = !arguments.after.empty();
-  const InputFile first = read_file(arguments.before, {.hash = !json.empty()}).value();
+  const InputFile first = read_input(arguments.before, arguments.common);
   InputFile second;
-  if (two) second = read_file(arguments.after, {.hash = !json.empty()}).value();
+  if (two) second = read_input(arguments.after, arguments.common);
   const Problem& result = two ? second.problem : first.problem;
   const ReportOptions options = options_of_page(arguments);
   const Timer writing;

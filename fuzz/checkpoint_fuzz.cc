@@ -17,12 +17,11 @@
 #include <string_view>
 
 #include "sheaf/sheaf.h"
-#include "solve/checkpoint_file.h"
+#include "solve/checkpoint.h"
 
 namespace {
 
 namespace fs = std::filesystem;
-constexpr sheaf::CheckpointKind kKind{"SHEAFCKP", "solve", 1};
 
 struct Run {
   sheaf::Problem start;
@@ -47,7 +46,7 @@ const Run& whole_run() {
     writes.checkpoint_every_s = 0;
     sheaf::Problem copy = run.start;
     sheaf::solve(copy, writes);
-    run.archived = sheaf::read_checkpoint_file(kKind, run.path).value();
+    run.archived = sheaf::read_checkpoint_file(sheaf::kSolveCheckpoint, run.path).value();
     return run;
   }();
   return kRun;
@@ -80,7 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Run& run = whole_run();
   std::string bytes = run.archived;
   for (; size >= kRecord; data += kRecord, size -= kRecord) edit(bytes, data);
-  if (!sheaf::write_checkpoint_file(kKind, bytes, run.path).ok()) std::abort();
+  if (!sheaf::write_checkpoint_file(sheaf::kSolveCheckpoint, bytes, run.path).ok()) std::abort();
   sheaf::Problem problem = run.start;
   sheaf::SolveOptions options = run.options;
   options.resume = run.path;

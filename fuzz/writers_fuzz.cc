@@ -3,7 +3,7 @@
 //
 // Problems made of any numbers and names: a format either refuses to write one, and then leaves
 // what was there under the name, or what it wrote is read again with as many images and
-// observations, and of the formats that hold doubles to the same costs.
+// observations.
 
 #include <fuzzer/FuzzedDataProvider.h>
 #include <unistd.h>

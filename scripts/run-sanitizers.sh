@@ -12,7 +12,8 @@ kind=$1
 run_ctest() { ctest --test-dir "build/$kind" -j "$(nproc)" --output-on-failure "$@"; }
 case $kind in
   asan)
-    # A clang with libFuzzer compiles this in two thirds of GCC's time, and the fuzz targets with it.
+    # A clang with libFuzzer compiles kernels in two thirds of GCC's time, and makes the fuzz targets
+    # of the same library.
     compiler=$(scripts/find-fuzz-compiler.sh)
     scripts/build.sh asan ${compiler:+-DCMAKE_CXX_COMPILER="$compiler" -DSHEAF_BUILD_FUZZ=ON}
     # Left out, besides tests/solve and tests/reduced (studies of how solves converge, through code

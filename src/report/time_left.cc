@@ -25,8 +25,8 @@ void TimeLeft::add(const Iteration& it) {
   steps_ = it.index;
   if (it.index == 0) return;
   // A round of the loss, or a recovery, begins anew.
-  if (it.passes > 0 || (!decreases_.empty() && it.trial_cost > it.start_cost && it.accepted))
-    decreases_.clear();
+  if (it.passes > 0 || it.round != round_) decreases_.clear();
+  round_ = it.round;
   if (it.accepted && it.start_cost > 0)
     push(decreases_, std::max(0.0, (it.start_cost - it.cost) / it.start_cost));
 }

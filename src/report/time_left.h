@@ -35,7 +35,7 @@ class TimeLeft {
   RunLimits limits_;
   std::vector<double> times_s_;    ///< of the last steps, since the run's beginning
   std::vector<double> decreases_;  ///< relative, of the last accepted steps
-  int steps_ = 0;
+  int steps_ = 0, round_ = 0;
 };
 
 }  // namespace sheaf

@@ -287,17 +287,13 @@ class Attempts {
       problem_.points.swap(points_);
     }
     held_.reset();
-    if (home == nullptr || !home->restore(home_))
-      return Error(ErrorCode::unreadable_input,
-                   options_.resume + ": the checkpoint does not hold what it should");
+    if (home == nullptr || !home->restore(home_)) return senseless_checkpoint(options_.resume);
     return home;
   }
 
   /// A checkpoint, where it is time for one. A run that is to stop leaves where it stands.
   void write_down(const Home& home) {
-    if (options_.checkpoint.empty() || !history_) return;
-    const double now = clock_.seconds();
-    if (!out_of_time() && now - written_s_ < options_.checkpoint_every_s) return;
+    if (!history_ || !times_.is_due(options_, clock_)) return;
     Checkpoint out;
     out.identity = identity_;
     out.summary = summary_;
@@ -311,12 +307,7 @@ class Attempts {
     out.recoveries = options_.recoveries;
     out.solver = options_.solver;
     out.initial_damping = options_.initial_damping;
-    const Result<void> done = write_checkpoint(out, options_.checkpoint);
-    if (done.ok())
-      ++summary_.checkpoints;
-    else
-      summary_.checkpoint_failure = done.error().what();
-    written_s_ = clock_.seconds();
+    times_.note(write_checkpoint(out, options_.checkpoint), clock_, summary_);
   }
 
   void tell_ending() {
@@ -431,7 +422,7 @@ class Attempts {
   std::optional<LoopHistory> history_;
   const RunIdentity& identity_;  ///< of the run, where it is written down
   RunProgress progress_;
-  double written_s_ = 0;    ///< when the last checkpoint was
+  CheckpointTimes times_;
   Build* build_ = nullptr;  ///< of the attempt
   Home* home_at_work_ = nullptr;
   // Of a checkpoint, until its home is made.

@@ -11,8 +11,6 @@
 namespace sheaf {
 namespace {
 
-constexpr CheckpointKind kKind{"SHEAFCKP", "solve", 1};
-
 bool fits(const Estimate& state, const Problem& problem) {
   if (state.poses.size() != problem.num_images() ||
       state.cameras.size() != problem.cameras.size() ||
@@ -53,12 +51,12 @@ RunIdentity identity_of(const Problem& problem, const SolveOptions& options,
 Result<void> write_checkpoint(const Checkpoint& checkpoint, const std::string& path) {
   ArchiveWriter a;
   a(checkpoint);
-  return write_checkpoint_file(kKind, a.bytes(), path);
+  return write_checkpoint_file(kSolveCheckpoint, a.bytes(), path);
 }
 
 Result<Checkpoint> read_checkpoint(const std::string& path, const RunIdentity& expected,
                                    const Problem& problem) {
-  const Result<std::string> bytes = read_checkpoint_file(kKind, path);
+  const Result<std::string> bytes = read_checkpoint_file(kSolveCheckpoint, path);
   if (!bytes.ok()) return bytes.error();
   ArchiveReader a(bytes.value());
   Checkpoint out;

@@ -14,6 +14,8 @@
 
 namespace sheaf {
 
+inline constexpr CheckpointKind kSolveCheckpoint{"SHEAFCKP", "solve", 1};
+
 /// A run before one of its steps: with the same problem and options another process goes on from it
 /// to the bits of the run that was never stopped.
 struct Checkpoint {

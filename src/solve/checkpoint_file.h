@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "options/option_field.h"
+#include "platform/clock.h"
 #include "sheaf/error.h"
+#include "sheaf/solve.h"
 
 namespace sheaf {
 
@@ -56,6 +58,29 @@ Result<void> write_checkpoint_file(const CheckpointKind& kind, std::string_view 
 /// What was archived. Errors: unreadable_input for what is no whole checkpoint of this kind and
 /// version.
 Result<std::string> read_checkpoint_file(const CheckpointKind& kind, const std::string& path);
+
+/// When a run is written down, and what came of it.
+class CheckpointTimes {
+ public:
+  /// So often as the options say, and where the run is to stop, which leaves where it stands.
+  template <class Options>
+  bool is_due(const Options& options, const Stopwatch& clock) const {
+    if (options.checkpoint.empty()) return false;
+    const double now = clock.seconds();
+    return options.stop.stop_requested() || now >= options.time_limit_s ||
+           now - written_s_ >= options.checkpoint_every_s;
+  }
+  void note(const Result<void>& written, const Stopwatch& clock, Summary& summary) {
+    if (written.ok())
+      ++summary.checkpoints;
+    else
+      summary.checkpoint_failure = written.error().what();
+    written_s_ = clock.seconds();
+  }
+
+ private:
+  double written_s_ = 0;
+};
 
 /// Of bytes that are whole and still make no sense.
 Error senseless_checkpoint(const std::string& path);

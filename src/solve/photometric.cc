@@ -102,20 +102,12 @@ class Refinement {
 
   /// A checkpoint, where it is time for one. A run that is to stop leaves where it stands.
   void write_down(const PhotometricSystem& system) {
-    const double now = clock_.seconds();
-    const bool stops = options_.stop.stop_requested() || now >= options_.time_limit_s;
-    if (options_.checkpoint.empty() || !history_) return;
-    if (!stops && now - written_s_ < options_.checkpoint_every_s) return;
+    if (!history_ || !times_.is_due(options_, clock_)) return;
     Summary& solve = summary_.solve;
-    const Result<void> done =
-        write_checkpoint({identity_, solve, *history_, progress_, system.history(), round_,
-                          system.state(), system.leaving(), brightness_fitted_, sigma_},
-                         options_.checkpoint);
-    if (done.ok())
-      ++solve.checkpoints;
-    else
-      solve.checkpoint_failure = done.error().what();
-    written_s_ = clock_.seconds();
+    times_.note(write_checkpoint({identity_, solve, *history_, progress_, system.history(), round_,
+                                  system.state(), system.leaving(), brightness_fitted_, sigma_},
+                                 options_.checkpoint),
+                clock_, solve);
   }
 
   /// Nothing says where anything is.
@@ -329,7 +321,7 @@ class Refinement {
   PatchRound round_;
   std::optional<LoopHistory> history_;  ///< of the round
   RunProgress progress_;
-  double written_s_ = 0;                       ///< when the last checkpoint was
+  CheckpointTimes times_;
   std::optional<PhotometricCheckpoint> from_;  ///< until its round goes on
   bool foreign_ = false;                       ///< it was of other patches
   PhotometricSummary summary_;
