@@ -141,6 +141,13 @@ Result<std::string> format_bundler(const Problem& given) {
   const Result<const Problem*> as_bal = with_bal_cameras(given, turned);
   if (!as_bal.ok()) return as_bal.error();
   const Problem& problem = *as_bal.value();
+  if (problem.num_images() == 0)
+    return Error(ErrorCode::usage, "the problem has no images; Bundler's files have at least one");
+  for (std::size_t j = 0; j < problem.num_images(); ++j)
+    if (problem.cameras[problem.image_camera[j]].parameters[0] == 0)
+      return Error(ErrorCode::usage, "image " + std::to_string(j) +
+                                         " has focal length 0, which Bundler keeps for images "
+                                         "that were never placed");
   const SceneMetadata* metadata = problem.metadata.get();
   const bool listed = metadata && metadata->source && metadata->source->format == "bundler";
   const std::size_t images = listed ? metadata->source->listed_images : problem.num_images();
