@@ -4,10 +4,12 @@
 #
 # Builds the fuzz targets with clang's libFuzzer, in the address sanitizer's build, and runs each for
 # a while, two at a time.
-#   scripts/run-fuzzers.sh [SECONDS_EACH]    default 60
+#   scripts/run-fuzzers.sh [SECONDS_EACH [SEED]]    default 60 and 1: from an empty build/fuzz/corpus
+# a seed tries the same inputs in the same order, as many as the seconds allow; 0 draws a seed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 seconds=${1:-60}
+seed=${2:-1}
 
 compiler=$(scripts/find-fuzz-compiler.sh)
 if [ -z "$compiler" ]; then
@@ -22,12 +24,12 @@ if [ ${#targets[@]} = 0 ]; then
   exit 1
 fi
 run_one() {
-  local target=$1 seconds=$2 name corpus seeds=()
+  local target=$1 seconds=$2 seed=$3 name corpus seeds=()
   name=$(basename "$target")
   corpus=build/fuzz/corpus/$name
   mkdir -p "$corpus"
   [ -d "fuzz/corpus/${name%_fuzz}" ] && seeds=("fuzz/corpus/${name%_fuzz}")
-  if ! "$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=3000 -print_final_stats=1 \
+  if ! "$target" -seed="$seed" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=3000 -print_final_stats=1 \
     -artifact_prefix=build/fuzz/"$name"- "$corpus" "${seeds[@]}" >"build/fuzz/$name.log" 2>&1; then
     tail -n 60 "build/fuzz/$name.log" >&2
     echo "fuzz: $name found a failing input (build/fuzz/$name-*)" >&2
@@ -37,4 +39,4 @@ run_one() {
     "$(sed -n 's/^stat::number_of_executed_units: *//p' "build/fuzz/$name.log")"
 }
 export -f run_one
-printf '%s\0' "${targets[@]}" | xargs -0 -P 2 -I{} bash -c 'run_one "$1" "$2"' _ {} "$seconds"
+printf '%s\0' "${targets[@]}" | xargs -0 -P 2 -I{} bash -c 'run_one "$@"' _ {} "$seconds" "$seed"
