@@ -53,6 +53,32 @@ TEST(Covisibility, LinksAreThoseOfTheSets) {
   EXPECT_EQ(found, links_by_sets(problem));
 }
 
+TEST(Covisibility, LinksOfManyImagesAreThoseOfTheSetsToo) {
+  constexpr std::uint32_t kImages = 1100;  // more than have a table of all pairs
+  Problem problem;
+  problem.cameras.resize(1);
+  problem.poses.resize(kImages);
+  problem.image_camera.assign(kImages, 0);
+  for (std::uint32_t p = 0; p < 700; ++p) {
+    problem.add_point(0, 0, 1);
+    // A few images far apart, one of them twice, and of some points a track that is long.
+    for (std::uint32_t k = 0; k < (p % 100 == 0 ? 60u : 4u); ++k)
+      problem.add_observation((7 * p + (k * k + 1) * 131 * (p % 3 + 1)) % kImages, p, k, 2);
+    problem.add_observation(7 * p % kImages, p, 1, 2);
+    problem.add_observation(7 * p % kImages, p, 3, 2);
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> found;
+  std::pair<std::uint32_t, std::uint32_t> last{0, 0};
+  for_each_link(problem, tracks_of(problem),
+                [&](std::uint32_t a, std::uint32_t b, std::uint32_t points) {
+                  EXPECT_LT(last, std::pair(a, b));
+                  last = {a, b};
+                  found[{a, b}] = points;
+                });
+  EXPECT_GT(found.size(), 3000u);
+  EXPECT_EQ(found, links_by_sets(problem));
+}
+
 // The matrix entry by entry, from the columns that each observation's derivatives are of.
 std::vector<std::vector<bool>> dense_jacobian(const Problem& p, const Tracks& tracks) {
   const bool own = p.cameras.size() == p.num_images();
