@@ -30,6 +30,7 @@
 #include "page/survey_section.h"
 #include "page/thumbnails.h"
 #include "page/verdict.h"
+#include "platform/base64.h"
 #include "platform/parallel.h"
 #include "scene/rigs.h"
 #include "sheaf/survey.h"

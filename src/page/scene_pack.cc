@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "page/html.h"
+#include "platform/base64.h"
 #include "platform/parallel.h"
 
 namespace sheaf {
@@ -261,21 +262,6 @@ double typical(const std::vector<double>& values) {
 }
 
 }  // namespace
-
-std::string base64(const std::string& bytes) {
-  static constexpr const char* kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      out += i + k > bytes.size() ? '=' : kDigits[word >> (18 - 6 * k) & 63];
-  }
-  return out;
-}
 
 Result<ScenePack> pack_scene(const PageScene& scene, const SceneView& view,
                              const std::vector<double>& point_sigma, const PackLimits& limits,

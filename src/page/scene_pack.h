@@ -35,7 +35,4 @@ Result<ScenePack> pack_scene(const PageScene& scene, const SceneView& view,
                              const std::vector<double>& point_sigma, const PackLimits& limits = {},
                              int threads = 1);
 
-/// RFC 4648, without line ends.
-std::string base64(const std::string& bytes);
-
 }  // namespace sheaf

@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "chart/number_text.h"
 #include "inspect/network_view.h"
 #include "inspect/pattern_figure.h"
 #include "sheaf/scene.h"
@@ -185,10 +187,25 @@ TEST(PatternFigureTest, CountsAndPixelsAreThere) {
   EXPECT_EQ(figure.counts.hessian_nonzeros, 81 * 30 + 9 * 500 + 54 * n);
   EXPECT_EQ(figure.counts.reduced_columns, 270u);
   EXPECT_EQ(figure.counts.links, links_by_sets(problem).size());
-  std::size_t dark = 0;
-  for (int y = 0; y < figure.image.height; ++y)
-    for (int x = 0; x < figure.image.width; ++x) dark += figure.image.at(x, y).red < 128;
-  EXPECT_GT(dark, 10000u);
+  const auto count = [&](const std::string& part) {
+    std::size_t found = 0;
+    for (std::size_t k = figure.svg.find(part); k != std::string::npos;
+         k = figure.svg.find(part, k + 1))
+      ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<image "), 5u) << "three matrices and two bars";
+  EXPECT_EQ(count("<circle "), 30u) << "a camera each";
+  EXPECT_EQ(count("<title>a title</title>"), 1u);
+  EXPECT_EQ(count(">Jacobian " + grouped(std::int64_t(2 * n)) + " × " + grouped(270 + 1500)), 1u);
+  std::size_t drawn = 0;
+  for (std::size_t k = figure.svg.find("<path d=\""); k != std::string::npos;
+       k = figure.svg.find("<path d=\"", k + 1)) {
+    const std::string path = figure.svg.substr(k, figure.svg.find("/>", k) - k);
+    if (path.ends_with("class=\"link\""))
+      drawn += std::size_t(std::count(path.begin(), path.end(), 'M'));
+  }
+  EXPECT_EQ(drawn, figure.counts.links);
   EXPECT_FALSE(draw_patterns(Problem(), "").ok());
 }
 
