@@ -205,21 +205,6 @@ std::string residual_section(const PageScene& scene, int threads) {
                  "<div class=\"grid\">" + charts + "</div>" + lens_maps(scene));
 }
 
-std::optional<Covariance> known_precision(const Problem& result, const ReportOptions& options) {
-  constexpr std::size_t kMostImages = 500, kMostObservations = 1000000;
-  if (!options.sigmas || result.num_observations() == 0 || result.num_images() > kMostImages ||
-      result.num_observations() > kMostObservations)
-    return {};
-  CovarianceOptions wanted;
-  wanted.fixed = options.fixed;
-  wanted.loss = options.loss;
-  wanted.threads = options.threads;
-  wanted.lens_motions = result.cameras.size() <= 4;
-  Result<Covariance> found = covariance(result, wanted);
-  if (!found.ok()) return {};
-  return std::move(found).value();
-}
-
 std::vector<double> point_sigmas(const Covariance& known) {
   std::vector<double> out;
   for (const auto& c : known.points) out.push_back(std::sqrt(c[0] + c[4] + c[8]));
@@ -287,6 +272,21 @@ std::string sections(const PageScene& scene, const Problem& result, const PageFa
 
 }  // namespace
 
+std::optional<Covariance> report_precision(const Problem& result, const ReportOptions& options) {
+  constexpr std::size_t kMostImages = 500, kMostObservations = 1000000;
+  if (!options.sigmas || result.num_observations() == 0 || result.num_images() > kMostImages ||
+      result.num_observations() > kMostObservations)
+    return {};
+  CovarianceOptions wanted;
+  wanted.fixed = options.fixed;
+  wanted.loss = options.loss;
+  wanted.threads = options.threads;
+  wanted.lens_motions = result.cameras.size() <= 4;
+  Result<Covariance> found = covariance(result, wanted);
+  if (!found.ok()) return {};
+  return std::move(found).value();
+}
+
 Result<std::string> report_page(const Problem* before, const Problem& after,
                                 const ReportOptions& options) {
   for (const Problem* problem : {before, &after})
@@ -309,8 +309,10 @@ Result<std::string> report_page(const Problem* before, const Problem& after,
   const Result<PageScene>& made = *found;
   if (!made.ok()) return made.error();
   const PageScene& scene = made.value();
-  const std::optional<Covariance> known = known_precision(after, options);
-  PageFacts facts{run ? &*run : nullptr, known ? &*known : nullptr, std::move(findings)};
+  std::optional<Covariance> own;
+  if (options.precision == nullptr) own = report_precision(after, options);
+  const Covariance* known = own ? &*own : options.precision;
+  PageFacts facts{run ? &*run : nullptr, known, std::move(findings)};
   const SceneView view =
       scene_view(scene, placed ? Vector3<double>{0, 0, 1} : Vector3<double>{0, 0, 0});
   const std::vector<double> sigmas = known ? point_sigmas(*known) : std::vector<double>();
