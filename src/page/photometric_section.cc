@@ -84,8 +84,9 @@ std::string strip(const PatchComparison& comparison, const PatchFit& fit) {
     x += 56;
     ++shown;
   }
-  return "<div class=\"strip\">" +
-         out.svg(620, 118, "Patches of point " + std::to_string(fit.point)) + "</div>";
+  // On a phone it scrolls by itself rather than shrink to nothing.
+  const std::string label = "Patches of point " + std::to_string(fit.point);
+  return "<div class=\"strip\">" + scrolling(label, out.svg(620, 118, label)) + "</div>";
 }
 
 std::string strips(const PhotometricPart& part) {
