@@ -26,6 +26,7 @@
 #include "page/run_section.h"
 #include "page/scene_pack.h"
 #include "page/scene_view.h"
+#include "page/sensor_table.h"
 #include "page/structure_section.h"
 #include "page/survey_section.h"
 #include "page/thumbnails.h"
@@ -235,7 +236,8 @@ std::string images_section(const PageScene& scene, const Problem& result, const 
                            const ReportOptions& options) {
   return section("images", "Images", image_words(scene),
                  image_section(scene, thumbnails(scene, result, options.images, options.threads),
-                               facts.covariance));
+                               facts.covariance) +
+                     sensor_table(result, facts.covariance));
 }
 
 /// What a run was, at the end; nothing of a scene alone.
