@@ -62,7 +62,7 @@ int run(const Arguments& arguments) {
   const std::string& json = arguments.common.json;
   check_outputs({{"--json", json}}, with_survey({arguments.in}, arguments.constraints));
   const InputFile input = read_input(arguments.in, arguments.common);
-  std::vector<Finding> findings = check(input.problem);
+  std::vector<Finding> findings = check(input.problem, arguments.common.threads);
   if (auto weak = weak_lenses(input.problem, arguments.common.threads))
     findings.push_back(*std::move(weak));
   print_out("{}: {}\n", arguments.in, counts_text(input.problem));

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
 
-#include "image/png.h"
 #include "inspect/pattern_figure.h"
 #include "inspect/statistics.h"
 #include "io/rotation_norms.h"
@@ -52,7 +52,7 @@ PatternCounts write_pattern(const Problem& problem, const std::string& name,
       draw_patterns(problem,
                     std::filesystem::path(name).filename().string() + ": " + counts_text(problem))
           .value();
-  write_text(encode_png(figure.image).value(), path);
+  write_text(figure.svg, path);
   const PatternCounts& c = figure.counts;
   print_out("network     {} pairs of images with points in common, {:.3g}% of all\n", c.links,
             100 * c.fill);
@@ -233,8 +233,20 @@ void print(const std::string& path, const InputFile& input, const Statistics& st
   print_histogram(statistics);
 }
 
+// A drawing is no raster image: names that say so are refused before any work.
+void check_pattern(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".png" || ending == ".jpg" || ending == ".jpeg")
+    throw Error(ErrorCode::usage, "--pattern: found " + path +
+                                      ", expected a name that ends in .svg: the figure is a "
+                                      "drawing, which browsers and editors of drawings show");
+}
+
 int run(const Arguments& arguments) {
   const Timer total;
+  check_pattern(arguments.pattern);
   const std::string& json = arguments.common.json;
   check_outputs({{"--pattern", arguments.pattern}, {"--json", json}},
                 {arguments.in, arguments.rigs.path});
@@ -277,14 +289,14 @@ Verb info_verb() {
   using F = FieldsOf<Arguments>;
   auto a = std::make_shared<Arguments>();
   Verb verb{"info", "what is in a problem, and how well it fits as it is",
-            "Example:\n  sheaf info problem.txt --json info.json --pattern pattern.png"};
+            "Example:\n  sheaf info problem.txt --json info.json --pattern pattern.svg"};
   verb.places = bound<Arguments>({F::text(&Arguments::in, problem_in())}, *a);
   verb.options = joined(
       {bound<Arguments>({F::text(&Arguments::pattern,
                                  {.name = "pattern",
                                   .placeholder = "FILE",
                                   .help = "also draw the network of images and the patterns of "
-                                          "Jacobian, Hessian and reduced camera matrix, as PNG"})},
+                                          "Jacobian, Hessian and reduced camera matrix, as SVG"})},
                         *a),
        options_of(a->rigs), options_of(a->common)});
   verb.run = [a] { return run(*a); };

@@ -69,19 +69,24 @@ Problem start_of(const Problem& problem, std::shared_ptr<const SceneMetadata> me
   return start;
 }
 
-// --report: of the end, in the frame that a survey has brought the problem into.
-void write_page(const Arguments& arguments, Problem start, const Problem& problem,
-                const SolveOptions& solved, const Summary& summary, const Json& document) {
-  start.points.resize(problem.points.size());
+ReportOptions page_options(const Arguments& arguments, const SolveOptions& solved,
+                           const Summary& summary) {
   ReportOptions options;
   options.title = std::filesystem::path(arguments.in).filename().string();
   options.images = arguments.images;
-  options.summary = document.dump(-1, ' ', false, Json::error_handler_t::replace);
   options.fixed = solved.fixed;
   options.threads = solved.threads;
   options.in_place = !arguments.constraints.paths.empty();
   if (solved.loss.kind != LossKind::none)
     options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
+  return options;
+}
+
+// --report: of the end, in the frame that a survey has brought the problem into.
+void write_page(const Arguments& arguments, Problem start, const Problem& problem,
+                ReportOptions options, const Json& document) {
+  start.points.resize(problem.points.size());
+  options.summary = document.dump(-1, ' ', false, Json::error_handler_t::replace);
   write_report(&start, problem, arguments.report, options).value();
 }
 
@@ -97,6 +102,7 @@ std::string hold(const RefinementArguments& arguments, const Problem& problem, F
 struct SurveyWork {
   std::optional<Survey> survey{};
   SurveyReport report{};
+  std::optional<Covariance> precision{};  // of the page, with the survey's terms
 };
 
 // How well the end is known, with the survey's terms still in the problem: --sigmas. An error waits
@@ -130,10 +136,15 @@ struct SigmasWork {
   }
 };
 
-// Points of the survey leave the problem, and the summary what it says of their marks.
-void finish(SurveyWork& work, Problem& problem, Summary& summary) {
+// Points of the survey leave the problem, and the summary what it says of their marks. What the
+// page tells of precision is found before that.
+void finish(const Arguments& arguments, const SolveOptions& options, SurveyWork& work,
+            Problem& problem, Summary& summary) {
   if (!work.survey) return;
+  if (!arguments.report.empty() && summary.usable())
+    work.precision = report_precision(problem, page_options(arguments, options, summary));
   work.report = finish_survey(problem, *work.survey);
+  if (work.precision) work.precision->points.resize(problem.num_points());
   const std::uint64_t own = problem.num_observations();
   for (auto* list : {&summary.behind_camera_before, &summary.behind_camera_after,
                      &summary.rejected_observations})
@@ -259,7 +270,9 @@ void write_record(const Arguments& arguments, const SolveRecord& record, const S
     written.push_back(arguments.common.json);
   }
   if (arguments.report.empty() || !summary.usable()) return;
-  write_page(arguments, std::move(start), problem, options, summary, document);
+  ReportOptions page = page_options(arguments, options, summary);
+  if (work.precision) page.precision = &*work.precision;
+  write_page(arguments, std::move(start), problem, page, document);
   written.push_back(arguments.report);
 }
 
@@ -304,7 +317,7 @@ int run(Arguments& arguments) {
   record.agrees = agrees(summary, record.after, problem);
   SigmasWork sigmas;
   if (!arguments.sigmas.empty() && summary.usable()) sigmas.run(problem, options, summary);
-  finish(work, problem, summary);
+  finish(arguments, options, work, problem, summary);
   if (work.survey) record.after = evaluate(problem);
   std::vector<std::string> written;
   if (summary.usable()) written = write_results(arguments, work, std::move(before), problem);

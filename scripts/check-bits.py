@@ -109,7 +109,7 @@ class Program:
         self.hash_files(name, self.work / folder, str(folder))
 
     def hash_files(self, name, folder, spelled):
-        """A line for each file, one for all PNGs of a folder, two for JSON."""
+        """A line for each file, one for all PNGs and one for all SVGs of a folder, two for JSON."""
         pictures = {}
         for path in sorted(p for p in folder.rglob("*") if p.is_file()):
             place = path.relative_to(folder)
@@ -121,8 +121,8 @@ class Program:
                 if options is not None:
                     self.hashes[f"{name}/json:options"] = sha256(
                         json.dumps(options, sort_keys=True).encode())
-            elif path.suffix == ".png":
-                pictures.setdefault(str(place.parent / "*.png"), hashlib.sha256()).update(
+            elif path.suffix in (".png", ".svg"):
+                pictures.setdefault(str(place.parent / f"*{path.suffix}"), hashlib.sha256()).update(
                     place.name.encode() + path.read_bytes())
             else:
                 self.hashes[f"{name}/{place}"] = sha256(path.read_bytes())

@@ -4,7 +4,7 @@
 #
 # Installs what Sheaf needs and this Debian or Ubuntu machine lacks.
 #   scripts/install-deps.sh             to build and test
-#   scripts/install-deps.sh --ci        also clang (fuzzing) and the pinned clang-format
+#   scripts/install-deps.sh --ci        also clang (fuzzing), the pinned clang-format, Chromium (reports)
 #   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
 # Several at once will do.
@@ -46,6 +46,26 @@ ci_packages() {
     echo clang-format-14
   fi
 }
+# For the browser's test, which is skipped without. What Ubuntu calls chromium-browser is a snap, of no
+# use in a container; a machine that has a browser by another way needs none.
+has_browser() {
+  local name
+  for name in chromium chromium-browser google-chrome google-chrome-stable; do
+    if command -v "$name" >/dev/null; then return 0; fi
+  done
+  return 1
+}
+install_browser() {
+  if has_browser; then return 0; fi
+  local started=$SECONDS
+  if is_offered chromium &&
+    as_root env DEBIAN_FRONTEND=noninteractive timeout 300 apt-get -qq \
+      -o DPkg::Lock::Timeout=120 install -y --no-install-recommends chromium >/dev/null; then
+    echo "install-deps: installed chromium in $((SECONDS - started)) s"
+  else
+    echo "install-deps: no Chromium can be had here; the browser's test will be skipped" >&2
+  fi
+}
 # Clang 16 with the library that Macs have, or what comes next to it.
 libcxx_packages() {
   local version
@@ -67,7 +87,7 @@ ci_complete() {
   local version
   version=$(default_clang)
   is_installed clang-format-14 && is_installed "clang-$version" &&
-    is_installed "libclang-rt-$version-dev"
+    is_installed "libclang-rt-$version-dev" && has_browser
 }
 libcxx_complete() {
   ! $libcxx || { is_installed clang-16 && is_installed libc++-16-dev; }
@@ -102,8 +122,9 @@ if $ci; then read -r -a extra <<<"$(ci_packages | tr '\n' ' ')"; fi
 if $libcxx; then read -r -a extra <<<"${extra[*]} $(libcxx_packages)"; fi
 mapfile -t missing < <(missing_of "${wanted[@]}" "${extra[@]}")
 if [ ${#missing[@]} = 0 ]; then
-  echo "install-deps: nothing is missing"
-  exit 0
+  echo "install-deps: no package is missing"
+else
+  echo "install-deps: installing ${missing[*]}"
+  apt_get -qq install -y --no-install-recommends "${missing[@]}" >/dev/null
 fi
-echo "install-deps: installing ${missing[*]}"
-apt_get -qq install -y --no-install-recommends "${missing[@]}" >/dev/null
+if $ci; then install_browser; fi

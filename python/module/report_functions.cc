@@ -66,7 +66,7 @@ nb::list check_problem(const ProblemHandle& held, int threads) {
   std::vector<Finding> findings;
   {
     const nb::gil_scoped_release released;
-    findings = check(use.problem());
+    findings = check(use.problem(), threads_here(threads));
     if (auto weak = weak_lenses(use.problem(), threads_here(threads)))
       findings.push_back(*std::move(weak));
   }

@@ -204,7 +204,7 @@ def add_files(c):
                                 ("libmv", "as.libmv", "a.problem"), ("rigs", "rigs", "model/"),
                                 ("ply", "lake", "a.ply"), ("repeats", "repeats", "a.txt")):
         c.solve(f"file.{name}", scene, result=result)
-        c.run(f"info.{name}", f"info {{{scene}}} --json @json --pattern @pattern.png")
+        c.run(f"info.{name}", f"info {{{scene}}} --json @json --pattern @pattern.svg")
         c.run(f"check.{name}", f"check {{{scene}}} --json @json")
     for name, words in {"back": "{as.colmap} @a.txt", "from-bundler": "{as.bundler} @a.txt",
                         "from-nvm": "{as.nvm} @model/", "from-libmv": "{as.libmv} @model/",
@@ -220,7 +220,7 @@ def add_files(c):
 
 def add_verbs(c):
     for name in ("street", "like", "opencv.three", "mixture", "opencv_fisheye.shared"):
-        c.run(f"info.{name}", f"info {{{name}}} --json @json --pattern @pattern.png")
+        c.run(f"info.{name}", f"info {{{name}}} --json @json --pattern @pattern.svg")
         c.run(f"check.{name}", f"check {{{name}}} --json @json", one_thread=True)
     noise = {"all": "--rotation 0.01 --center 0.02 --translation 0.01 --point 0.02 --pixel 0.5"
                     " --intrinsics 5,0.01,0.01 --seed 3",
@@ -311,7 +311,7 @@ REAL = {
     "ladybug.explicit": f"solve {LADYBUG} -o @a.txt --json @json --solver iterative-explicit"
                         " --precision mixed",
     "ladybug.check": f"check {LADYBUG} --json @json",
-    "ladybug.info": f"info {LADYBUG} --json @json --pattern @pattern.png",
+    "ladybug.info": f"info {LADYBUG} --json @json --pattern @pattern.svg",
     "door": "solve data/colmap/gtsfm-lund-door-12 -o @model/ --json @json",
     "door.pp": "solve data/colmap/gtsfm-lund-door-12 -o @model/ --json @json --refine pp",
     "crane": "solve data/colmap/gtsfm-crane-mast-8 -o @model/ --json @json",

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "chart/number_text.h"
+#include "platform/base64.h"
 
 namespace sheaf {
 namespace {
@@ -15,6 +16,12 @@ constexpr double kBeyond = 400;
 std::string label_of(double tick, bool last, const std::string& unit, const Plot::Words& words) {
   const std::string text = words ? words(tick) : tick_text(tick);
   return last && !unit.empty() ? text + kThinSpace + unit : text;
+}
+
+std::string anchored(Anchor anchor) {
+  return anchor == Anchor::start    ? ""
+         : anchor == Anchor::middle ? " text-anchor=\"middle\""
+                                    : " text-anchor=\"end\"";
 }
 
 }  // namespace
@@ -37,10 +44,21 @@ void Drawing::rectangle(double x, double y, double width, double height,
 
 void Drawing::text(double x, double y, const std::string& text, const std::string& classes,
                    Anchor anchor) {
-  out_ += "<text x=\"" + coordinate(x) + "\" y=\"" + coordinate(y) + "\" class=\"" + classes + "\"";
-  if (anchor != Anchor::start)
-    out_ += anchor == Anchor::middle ? " text-anchor=\"middle\"" : " text-anchor=\"end\"";
-  out_ += ">" + escaped(text) + "</text>";
+  out_ += "<text x=\"" + coordinate(x) + "\" y=\"" + coordinate(y) + "\" class=\"" + classes +
+          "\"" + anchored(anchor) + ">" + escaped(text) + "</text>";
+}
+
+void Drawing::text_upwards(double x, double y, const std::string& text, const std::string& classes,
+                           Anchor anchor) {
+  out_ += "<text transform=\"translate(" + coordinate(x) + " " + coordinate(y) +
+          ") rotate(-90)\" class=\"" + classes + "\"" + anchored(anchor) + ">" + escaped(text) +
+          "</text>";
+}
+
+void Drawing::picture(double x, double y, double width, double height, const std::string& png) {
+  out_ += "<image x=\"" + coordinate(x) + "\" y=\"" + coordinate(y) + "\" width=\"" +
+          coordinate(width) + "\" height=\"" + coordinate(height) +
+          "\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," + base64(png) + "\"/>";
 }
 
 std::string Drawing::svg(double width, double height, const std::string& label) const {

@@ -25,6 +25,11 @@ class Drawing {
   /// The text is escaped here.
   void text(double x, double y, const std::string& text, const std::string& classes,
             Anchor anchor = Anchor::start);
+  /// Upwards, as beside a vertical axis; (x, y) is on the letters' line.
+  void text_upwards(double x, double y, const std::string& text, const std::string& classes,
+                    Anchor anchor = Anchor::start);
+  /// The pixels of a PNG file, stretched to this place.
+  void picture(double x, double y, double width, double height, const std::string& png);
   const std::string& content() const { return out_; }
   /// As an image of this size, whose label is read where it cannot be seen; scales to its place.
   std::string svg(double width, double height, const std::string& label) const;

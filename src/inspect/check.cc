@@ -14,6 +14,7 @@
 #include "inspect/rig_findings.h"
 #include "inspect/statistics.h"
 #include "io/rotation_norms.h"
+#include "platform/parallel.h"
 #include "scene/camera_plane.h"
 #include "scene/point_errors.h"
 #include "scene/rigs.h"
@@ -88,11 +89,11 @@ void check_images(const Problem& problem, FindingList& list) {
                "more matches, or leave them out");
 }
 
-void check_points(const Problem& problem, FindingList& list) {
+void check_points(const Problem& problem, int threads, FindingList& list) {
   std::vector<std::uint32_t> tracks(problem.num_points(), 0);
   for (const std::uint32_t p : problem.observation_point) ++tracks[p];
   const std::vector<double> angles =
-      ray_angles_deg(problem, std::vector<bool>(problem.num_observations(), true));
+      ray_angles_deg(problem, std::vector<bool>(problem.num_observations(), true), threads);
   Numbers lone, narrow;
   for (std::size_t p = 0; p < tracks.size(); ++p) {
     if (tracks[p] < 2) lone.push_back(p);
@@ -172,8 +173,8 @@ void check_rank(const Problem& problem, FindingList& list) {
            "poses) or find more matches"});
 }
 
-void check_duplicates(const Problem& problem, FindingList& list) {
-  const auto [same, again] = repetitions_in(problem);
+void check_duplicates(const Repetitions& repetitions, FindingList& list) {
+  const auto& [same, again] = repetitions;
   list.add("repeated-observations", true, "observations", same,
            plural(same.size(), "observation occurs", "observations occur") +
                " twice, pixel and all: they count double; leave them out (convert "
@@ -200,8 +201,7 @@ void check_measurements(const Numbers& absurd, FindingList& list, Named& named) 
   name(absurd, named);
 }
 
-void check_planes(const Problem& problem, FindingList& list, Named& named) {
-  const PlaneSights sights = plane_sights(problem);
+void check_planes(const PlaneSights& sights, FindingList& list, Named& named) {
   const char* const remedy =
       ": wrong matches or a bad start; leave them out (solve --cheirality hold-out, convert "
       "--drop-behind)";
@@ -217,8 +217,8 @@ void check_planes(const Problem& problem, FindingList& list, Named& named) {
   name(sights.at_centre, named);
 }
 
-void check_residuals(const Problem& problem, FindingList& list, const Named& named) {
-  Evaluation evaluation = evaluate(problem);
+void check_residuals(Evaluation evaluation, const std::vector<double>& all, FindingList& list,
+                     const Named& named) {
   for (Numbers* which : {&evaluation.behind, &evaluation.not_finite})
     std::erase_if(*which, [&](std::uint64_t i) { return named[i]; });
   list.add("behind-camera", true, "observations", evaluation.behind,
@@ -229,7 +229,6 @@ void check_residuals(const Problem& problem, FindingList& list, const Named& nam
            plural(evaluation.not_finite.size(), "observation has", "observations have") +
                " a residual that is not finite: numbers so large that they overflow; leave them "
                "out (convert --max-error)");
-  const std::vector<double> all = residual_lengths(problem);
   std::vector<double> lengths = all;
   std::erase_if(lengths, [](double x) { return !std::isfinite(x); });
   const double median = range_of(std::move(lengths)).median;
@@ -244,24 +243,53 @@ void check_residuals(const Problem& problem, FindingList& list, const Named& nam
                "cauchy:auto) or leave them out (convert --max-error)");
 }
 
+/// What takes time: each a task of its own.
+struct Evidence {
+  FindingList joined, points;
+  Repetitions repetitions;
+  MeasuredReaches measured;
+  PlaneSights planes;
+  Evaluation evaluation;
+  std::vector<double> lengths;
+};
+
+Evidence gathered(const Problem& problem, int threads) {
+  Evidence out;
+  constexpr std::size_t kTasks = 7;
+  // The longest first.
+  Threads(threads).for_each(kTasks, [&](std::size_t task) {
+    if (task == 0) check_points(problem, threads, out.points);
+    if (task == 1) out.evaluation = evaluate(problem);
+    if (task == 2) out.measured = measured_reaches(problem);
+    if (task == 3) out.repetitions = repetitions_in(problem);
+    if (task == 4) out.lengths = residual_lengths(problem, threads);
+    if (task == 5) check_parts(problem, out.joined);
+    if (task == 6) out.planes = plane_sights(problem);
+  });
+  return out;
+}
+
+void append(FindingList from, FindingList& to) {
+  for (Finding& finding : from.findings) to.findings.push_back(std::move(finding));
+}
+
 }  // namespace
 
-std::vector<Finding> check(const Problem& problem) {
-  FindingList list;
-  check_parts(problem, list);
+std::vector<Finding> check(const Problem& problem, int threads) {
+  Evidence found = gathered(problem, threads);
+  FindingList list = std::move(found.joined);
   check_images(problem, list);
   check_rigs(problem, list);
-  check_points(problem, list);
+  append(std::move(found.points), list);
   check_rank(problem, list);
   check_stale_poses(problem, list);
   check_norms(problem, list);
-  check_duplicates(problem, list);
-  const MeasuredReaches measured = measured_reaches(problem);
+  check_duplicates(found.repetitions, list);
   Named named(problem.num_observations(), false);
-  check_measurements(measured.absurd, list, named);
-  check_planes(problem, list, named);
-  check_residuals(problem, list, named);
-  check_lenses(problem, measured.reaches, list);
+  check_measurements(found.measured.absurd, list, named);
+  check_planes(found.planes, list, named);
+  check_residuals(std::move(found.evaluation), found.lengths, list, named);
+  check_lenses(problem, found.measured.reaches, list);
   std::stable_sort(list.findings.begin(), list.findings.end(),
                    [](const Finding& a, const Finding& b) { return a.grave > b.grave; });
   return std::move(list.findings);

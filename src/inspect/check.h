@@ -13,7 +13,7 @@ namespace sheaf {
 /// images, frames, sensors and points with too few measurements, measurements that occur twice or
 /// lie where no image can hold them, points behind cameras, in their planes and at their centres,
 /// rays that hardly meet, absurd focal lengths and distortion, lenses that fold back, residuals far
-/// off. Grave ones first.
-std::vector<Finding> check(const Problem& problem);
+/// off. Grave ones first. threads: 0 takes all; findings do not depend on it.
+std::vector<Finding> check(const Problem& problem, int threads = 1);
 
 }  // namespace sheaf

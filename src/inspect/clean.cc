@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "geometry/rotation.h"
+#include "inspect/covisibility.h"
+#include "platform/parallel.h"
 #include "scene/camera_plane.h"
 #include "scene/point_errors.h"
 #include "scene/rigs.h"
@@ -31,28 +33,57 @@ std::vector<Vector3<double>> centres_of(const Problem& problem) {
 }
 
 /// Images that see each point, those of point i from begin[i] to begin[i + 1].
-struct Tracks {
+struct Viewers {
   std::vector<std::uint64_t> begin;
   std::vector<std::uint32_t> images;
 };
 
-Tracks tracks_of(const Problem& problem, const std::vector<bool>& kept) {
-  Tracks tracks;
-  tracks.begin.assign(problem.num_points() + 1, 0);
+Viewers viewers_of(const Problem& problem, const std::vector<bool>& kept) {
+  Viewers viewers;
+  viewers.begin.assign(problem.num_points() + 1, 0);
   for (std::size_t i = 0; i < kept.size(); ++i)
-    if (kept[i]) ++tracks.begin[problem.observation_point[i] + 1];
-  for (std::size_t p = 0; p < problem.num_points(); ++p) tracks.begin[p + 1] += tracks.begin[p];
-  tracks.images.resize(tracks.begin.back());
-  std::vector<std::uint64_t> next(tracks.begin.begin(), tracks.begin.end() - 1);
+    if (kept[i]) ++viewers.begin[problem.observation_point[i] + 1];
+  for (std::size_t p = 0; p < problem.num_points(); ++p) viewers.begin[p + 1] += viewers.begin[p];
+  viewers.images.resize(viewers.begin.back());
+  std::vector<std::uint64_t> next(viewers.begin.begin(), viewers.begin.end() - 1);
   for (std::size_t i = 0; i < kept.size(); ++i)
-    if (kept[i]) tracks.images[next[problem.observation_point[i]]++] = problem.observation_image[i];
-  return tracks;
+    if (kept[i])
+      viewers.images[next[problem.observation_point[i]]++] = problem.observation_image[i];
+  return viewers;
 }
 
-double angle_between(const Vector3<double>& a, const Vector3<double>& b) {
+/// The angle between two rays by numbers that are in proportion to its sine and cosine.
+struct RayAngle {
+  double sine = 0, cosine = 0;
+
+  double radians() const { return std::atan2(sine, cosine); }
+  /// Smaller, and not by rounding.
+  bool clearly_below(const RayAngle& other) const {
+    const double a = sine * other.cosine, b = cosine * other.sine;
+    return a - b < -1e-12 * (std::abs(a) + std::abs(b));
+  }
+};
+
+RayAngle angle_between(const Vector3<double>& a, const Vector3<double>& b) {
   const Vector3<double> c = cross(a, b);
-  const double sine = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-  return std::atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+  return {std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]),
+          a[0] * b[0] + a[1] * b[1] + a[2] * b[2]};
+}
+
+/// Between any two, rad; 0 of fewer than two. Arc tangents, which take most of the time, are for
+/// those alone that may be the widest.
+double widest_angle(const std::vector<Vector3<double>>& rays, std::vector<RayAngle>& angles) {
+  angles.clear();
+  RayAngle wide{0, 1};
+  for (std::size_t a = 0; a < rays.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) {
+      angles.push_back(angle_between(rays[a], rays[b]));
+      if (wide.clearly_below(angles.back())) wide = angles.back();
+    }
+  double widest = 0;
+  for (const RayAngle& angle : angles)
+    if (!angle.clearly_below(wide)) widest = std::max(widest, angle.radians());
+  return widest;
 }
 
 /// An observation is in one list: at the centre, in the plane, or else behind.
@@ -69,42 +100,43 @@ void find_behind(const Problem& problem, CleanRecord& record) {
 
 }  // namespace
 
-std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<bool>& kept) {
+std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<bool>& kept,
+                                   int threads) {
   const std::vector<Vector3<double>> centres = centres_of(problem);
-  const Tracks tracks = tracks_of(problem, kept);
+  const Viewers viewers = viewers_of(problem, kept);
   std::vector<double> angles(problem.num_points(), 0);
-  std::vector<Vector3<double>> rays;
-  for (std::size_t p = 0; p < angles.size(); ++p) {
-    const std::uint64_t begin = tracks.begin[p], length = tracks.begin[p + 1] - begin;
-    const std::uint64_t step = (length + kMostRays - 1) / kMostRays;
-    rays.clear();
-    for (std::uint64_t k = 0; k < length; k += step) {
-      const Vector3<double>& c = centres[tracks.images[begin + k]];
-      rays.push_back({problem.points[3 * p] - c[0], problem.points[3 * p + 1] - c[1],
-                      problem.points[3 * p + 2] - c[2]});
+  constexpr std::size_t kEach = 1 << 14;
+  Threads(threads).for_ranges(angles.size(), kEach, [&](std::size_t first, std::size_t end) {
+    std::vector<Vector3<double>> rays;
+    std::vector<RayAngle> pairs;
+    for (std::size_t p = first; p < end; ++p) {
+      const std::uint64_t begin = viewers.begin[p], length = viewers.begin[p + 1] - begin;
+      const std::uint64_t step = (length + kMostRays - 1) / kMostRays;
+      rays.clear();
+      for (std::uint64_t k = 0; k < length; k += step) {
+        const Vector3<double>& c = centres[viewers.images[begin + k]];
+        rays.push_back({problem.points[3 * p] - c[0], problem.points[3 * p + 1] - c[1],
+                        problem.points[3 * p + 2] - c[2]});
+      }
+      angles[p] = widest_angle(rays, pairs) * (180 / std::numbers::pi);
     }
-    for (std::size_t a = 0; a < rays.size(); ++a)
-      for (std::size_t b = 0; b < a; ++b)
-        angles[p] = std::max(angles[p], angle_between(rays[a], rays[b]));
-    angles[p] *= 180 / std::numbers::pi;
-  }
+  });
   return angles;
 }
 
 Repetitions repetitions_in(const Problem& problem) {
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
-  pairs.reserve(problem.num_observations());
-  for (std::size_t i = 0; i < problem.num_observations(); ++i)
-    pairs.emplace_back(
-        std::uint64_t{problem.observation_point[i]} << 32 | problem.observation_image[i], i);
-  std::sort(pairs.begin(), pairs.end());
+  // A point's observations by image, those of one image in their own order: repetitions are
+  // neighbours.
+  const Tracks tracks = tracks_of(problem);
   Repetitions out;
-  for (std::size_t k = 1; k < pairs.size(); ++k) {
-    if (pairs[k].first != pairs[k - 1].first) continue;
-    const double* a = &problem.observation_xy[2 * pairs[k - 1].second];
-    const double* b = &problem.observation_xy[2 * pairs[k].second];
-    (a[0] == b[0] && a[1] == b[1] ? out.same_pixel : out.other_pixel).push_back(pairs[k].second);
-  }
+  for (std::size_t p = 0; p < problem.num_points(); ++p)
+    for (std::uint64_t k = tracks.begin[p] + 1; k < tracks.begin[p + 1]; ++k) {
+      const std::uint64_t before = tracks.order[k - 1], at = tracks.order[k];
+      if (problem.observation_image[before] != problem.observation_image[at]) continue;
+      const double* a = &problem.observation_xy[2 * before];
+      const double* b = &problem.observation_xy[2 * at];
+      (a[0] == b[0] && a[1] == b[1] ? out.same_pixel : out.other_pixel).push_back(at);
+    }
   std::sort(out.same_pixel.begin(), out.same_pixel.end());
   std::sort(out.other_pixel.begin(), out.other_pixel.end());
   return out;

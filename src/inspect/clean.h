@@ -45,7 +45,9 @@ struct Repetitions {
 Repetitions repetitions_in(const Problem& problem);
 
 /// Largest angle at which two rays of each point meet, degrees; 0 for one with fewer than two. Of a
-/// track of more than 64 observations, 64 spread over it are looked at.
-std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<bool>& kept);
+/// track of more than 64 observations, 64 spread over it are looked at. threads: 0 takes all; the
+/// bits do not depend on it.
+std::vector<double> ray_angles_deg(const Problem& problem, const std::vector<bool>& kept,
+                                   int threads = 1);
 
 }  // namespace sheaf

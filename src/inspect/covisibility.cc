@@ -17,23 +17,59 @@ void sort_by(const std::vector<std::uint32_t>& keys, std::size_t size, Tracks& o
   for (std::uint64_t i = 0; i < keys.size(); ++i) out.order[next[keys[i]]++] = i;
 }
 
+// Ascending by image, those of one image in their order. Nearly every track is short, and a stable
+// sort of the library asks for memory each time.
+void sort_by_image(const Problem& problem, std::uint64_t* first, std::uint64_t* end) {
+  constexpr std::ptrdiff_t kShort = 32;
+  const std::vector<std::uint32_t>& image = problem.observation_image;
+  if (end - first > kShort) {
+    std::stable_sort(first, end,
+                     [&](std::uint64_t a, std::uint64_t b) { return image[a] < image[b]; });
+    return;
+  }
+  for (std::uint64_t* at = first; at != end; ++at) {
+    const std::uint64_t moved = *at;
+    std::uint64_t* place = at;
+    for (; place != first && image[moved] < image[place[-1]]; --place) *place = place[-1];
+    *place = moved;
+  }
+}
+
+using EachLink = std::function<void(std::uint32_t, std::uint32_t, std::uint32_t)>;
+
+// Counts of all pairs at once, a row for each image.
+void for_each_link_of_few(const Problem& problem, const Tracks& tracks, const EachLink& link) {
+  const std::size_t images = problem.num_images();
+  std::vector<std::uint32_t> shared(images * images, 0), seeing;
+  for (std::size_t p = 0; p < problem.num_points(); ++p) {
+    seeing.clear();
+    for (std::uint64_t k = tracks.begin[p]; k < tracks.begin[p + 1]; ++k) {
+      const std::uint32_t image = problem.observation_image[tracks.order[k]];
+      if (seeing.empty() || seeing.back() != image) seeing.push_back(image);
+    }
+    for (std::size_t a = 0; a < seeing.size(); ++a)
+      for (std::size_t b = a + 1; b < seeing.size(); ++b) ++shared[images * seeing[a] + seeing[b]];
+  }
+  for (std::uint32_t a = 0; a < images; ++a)
+    for (std::uint32_t b = a + 1; b < images; ++b)
+      if (shared[images * a + b] > 0) link(a, b, shared[images * a + b]);
+}
+
 }  // namespace
 
 Tracks tracks_of(const Problem& problem) {
   Tracks out;
   sort_by(problem.observation_point, problem.num_points(), out);
   for (std::size_t p = 0; p < problem.num_points(); ++p)
-    std::stable_sort(out.order.begin() + static_cast<std::ptrdiff_t>(out.begin[p]),
-                     out.order.begin() + static_cast<std::ptrdiff_t>(out.begin[p + 1]),
-                     [&](std::uint64_t a, std::uint64_t b) {
-                       return problem.observation_image[a] < problem.observation_image[b];
-                     });
+    sort_by_image(problem, out.order.data() + out.begin[p], out.order.data() + out.begin[p + 1]);
   return out;
 }
 
 void for_each_link(const Problem& problem, const Tracks& tracks,
                    const std::function<void(std::uint32_t, std::uint32_t, std::uint32_t)>& link) {
+  constexpr std::size_t kFew = 1024;  // their table has 4 MB
   const std::size_t images = problem.num_images();
+  if (images <= kFew) return for_each_link_of_few(problem, tracks, link);
   Tracks by_image;
   sort_by(problem.observation_image, images, by_image);
   std::vector<std::uint32_t> shared(images, 0), seen, points;

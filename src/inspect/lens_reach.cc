@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "geometry/camera_model.h"
 #include "inspect/statistics.h"
@@ -40,15 +39,26 @@ std::vector<Offset> offsets_of(const Problem& problem) {
   return out;
 }
 
-/// The median length of each lens's offsets, or of all where a lens has few.
-std::vector<double> medians_of(const Problem& problem, const std::vector<Offset>& offsets) {
-  std::vector<std::vector<double>> own(problem.cameras.size());
-  std::vector<double> all, medians;
-  for (std::size_t i = 0; i < offsets.size(); ++i) {
-    all.push_back(length(offsets[i]));
-    own[problem.image_camera[problem.observation_image[i]]].push_back(all.back());
+std::vector<double> lengths_of(const std::vector<Offset>& offsets) {
+  std::vector<double> out;
+  out.reserve(offsets.size());
+  for (const Offset& offset : offsets) {
+    // std::hypot takes several times as long: it is for what would overflow.
+    const double square = offset[0] * offset[0] + offset[1] * offset[1];
+    out.push_back(square > 1e-280 && square < 1e280 ? std::sqrt(square) : length(offset));
   }
-  const double of_all = range_of(std::move(all)).median;
+  return out;
+}
+
+/// The median length of each lens's offsets, or of all where a lens has few.
+std::vector<double> medians_of(const Problem& problem, const std::vector<double>& lengths) {
+  std::vector<std::vector<double>> own(problem.cameras.size());
+  for (std::size_t i = 0; i < lengths.size(); ++i)
+    own[problem.image_camera[problem.observation_image[i]]].push_back(lengths[i]);
+  const bool some_have_few = std::any_of(own.begin(), own.end(),
+                                         [](const auto& list) { return list.size() < kFewOfLens; });
+  const double of_all = some_have_few ? range_of(lengths).median : 0;
+  std::vector<double> medians;
   for (std::vector<double>& list : own)
     medians.push_back(list.size() < kFewOfLens ? of_all : range_of(std::move(list)).median);
   return medians;
@@ -62,11 +72,17 @@ bool outside_image(const Camera& camera, const double* pixel) {
 
 }  // namespace
 
+std::size_t LensReach::sector_of(const Offset& offset) {
+  const double x = offset[0], y = offset[1], wide = std::abs(x), tall = std::abs(y);
+  if (y < 0) return x < 0 ? (tall < wide ? 0 : 1) : (wide < tall ? 2 : 3);
+  if (x > 0 || (x == 0 && y == 0)) return tall < wide || y == 0 ? 4 : 5;
+  if (y == 0) return 0;
+  return wide < tall ? 6 : 7;
+}
+
 void LensReach::add(const Offset& offset) {
-  const double turn = std::atan2(offset[1], offset[0]) / (2 * std::numbers::pi) + 0.5;
-  if (!(turn >= 0)) return;  // not a number
-  const std::size_t sector = static_cast<std::size_t>(turn * kSectors) % kSectors;
-  if (length(offset) > length(offsets[sector])) offsets[sector] = offset;
+  std::array<double, 2>& known = offsets[sector_of(offset)];
+  if (length(offset) > length(known)) known = offset;
 }
 
 double LensReach::farthest() const {
@@ -89,17 +105,23 @@ LensReach reach_of_corners(const Camera& camera) {
 
 MeasuredReaches measured_reaches(const Problem& problem) {
   const std::vector<Offset> offsets = offsets_of(problem);
-  const std::vector<double> medians = medians_of(problem, offsets);
+  const std::vector<double> lengths = lengths_of(offsets);
+  const std::vector<double> medians = medians_of(problem, lengths);
   MeasuredReaches out;
+  std::vector<std::array<double, LensReach::kSectors>> farthest(problem.cameras.size());
   out.reaches.resize(problem.cameras.size());
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     const std::uint32_t c = problem.image_camera[problem.observation_image[i]];
     const Camera& camera = problem.cameras[c];
-    const double far = length(offsets[i]);
+    const double far = lengths[i];
     const bool absurd = size_known(camera) ? outside_image(camera, &problem.observation_xy[2 * i])
                                            : medians[c] > 0 && far > kAbsurd * medians[c];
     if (absurd) out.absurd.push_back(i);
-    if (!absurd && far <= kReach * medians[c]) out.reaches[c].add(offsets[i]);
+    if (absurd || !(far <= kReach * medians[c])) continue;
+    const std::size_t sector = LensReach::sector_of(offsets[i]);
+    if (!(far > farthest[c][sector])) continue;
+    farthest[c][sector] = far;
+    out.reaches[c].offsets[sector] = offsets[i];
   }
   return out;
 }

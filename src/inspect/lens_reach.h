@@ -16,6 +16,8 @@ struct LensReach {
   static constexpr std::size_t kSectors = 8;
   std::array<std::array<double, 2>, kSectors> offsets{};  ///< px from the principal point; 0: none
 
+  /// Of an offset: eighths of a turn, from the negative x axis on and y downward first.
+  static std::size_t sector_of(const std::array<double, 2>& offset);
   void add(const std::array<double, 2>& offset);
   /// The farthest of all, px.
   double farthest() const;

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 
-#include "image/image.h"
 #include "sheaf/problem.h"
 
 namespace sheaf {
@@ -21,7 +20,7 @@ struct PatternCounts {
 };
 
 struct PatternFigure {
-  Image image;
+  std::string svg;  ///< a file's text; the matrices' pixels are pictures in it
   PatternCounts counts;
 };
 

@@ -28,9 +28,14 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 
 Range range_of(std::vector<double> values) {
   if (values.empty()) return {};
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return {values.front(), (values[(n - 1) / 2] + values[n / 2]) / 2, values.back()};
+  const auto [least, most] = std::minmax_element(values.begin(), values.end());
+  Range out{*least, 0, *most};
+  // The upper of the two in the middle; of an even number the lower is the largest before it.
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  const double lower = values.size() % 2 == 1 ? *middle : *std::max_element(values.begin(), middle);
+  out.median = (lower + *middle) / 2;
+  return out;
 }
 
 Statistics statistics_of(const Problem& problem) {

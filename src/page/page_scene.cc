@@ -52,6 +52,18 @@ void carry_start(const Problem& from, const Matching& matching, PageScene& scene
   }
 }
 
+/// Without what was measured.
+Problem state_of(const Problem& problem) {
+  Problem out;
+  out.poses = problem.poses;
+  out.image_camera = problem.image_camera;
+  out.cameras = problem.cameras;
+  out.points = problem.points;
+  out.bal_angle_axis = problem.bal_angle_axis;
+  out.rigs = problem.rigs;
+  return out;
+}
+
 /// Images of rigs stand where frames and sensors put them; nobody asks for these any more.
 Problem plain(const Problem& problem) {
   Problem turned;
@@ -205,6 +217,38 @@ void rank_images(PageScene& scene) {
                    [&](std::uint32_t a, std::uint32_t b) { return rms[a] > rms[b]; });
 }
 
+void find_result(int threads, PageScene& scene) {
+  sort_by_image(scene);
+  find_frames(scene);
+  find_poses(scene.result, scene.after);
+  find_residuals(scene.result, threads, scene.after);
+  summarise(scene.result, scene.after);
+  // The length of two normal coordinates has the median sigma sqrt(2 ln 2).
+  scene.sigma = scene.after.median / std::sqrt(2 * std::log(2.0));
+  rank_images(scene);
+}
+
+void find_links(PageScene& scene) {
+  for_each_link(scene.result, tracks_of(scene.result),
+                [&](std::uint32_t a, std::uint32_t b, std::uint32_t points) {
+                  scene.links.push_back({a, b, points});
+                });
+}
+
+Result<void> find_start(const Problem& start, const Problem& result,
+                        const PageSceneOptions& options, PageScene& scene) {
+  const Result<Matching> matching = match_models(start, result);
+  if (!matching.ok()) return matching.error();
+  scene.has_start = true;
+  scene.start = scene.result;
+  carry_start(plain(state_of(start)), matching.value(), scene);
+  find_poses(scene.start, scene.before);
+  find_residuals(scene.start, options.threads, scene.before);
+  forget_unknown(scene, scene.before);
+  summarise(scene.start, scene.before);
+  return {};
+}
+
 }  // namespace
 
 double quantile(std::vector<float>& values, double part) {
@@ -247,29 +291,15 @@ Result<PageScene> page_scene(const Problem* start, const Problem& result,
   scene.has_bal_lenses = has_bal_cameras(result);
   scene.result = plain(result);
   scene.names = names_of(result);
-  sort_by_image(scene);
-  find_frames(scene);
-  find_poses(scene.result, scene.after);
-  find_residuals(scene.result, options.threads, scene.after);
-  summarise(scene.result, scene.after);
-  // The length of two normal coordinates has the median sigma sqrt(2 ln 2).
-  scene.sigma = scene.after.median / std::sqrt(2 * std::log(2.0));
-  rank_images(scene);
-  for_each_link(scene.result, tracks_of(scene.result),
-                [&](std::uint32_t a, std::uint32_t b, std::uint32_t points) {
-                  scene.links.push_back({a, b, points});
-                });
-  if (start == nullptr) return scene;
-  const Result<Matching> matching = match_models(*start, result);
-  if (!matching.ok()) return matching.error();
-  scene.has_start = true;
-  scene.start = scene.result;
-  carry_start(plain(*start), matching.value(), scene);
-  find_poses(scene.start, scene.before);
-  find_residuals(scene.start, options.threads, scene.before);
-  forget_unknown(scene, scene.before);
-  summarise(scene.start, scene.before);
-  if (!options.placed) align_start(scene);
+  Result<void> carried;
+  // Both states and the links write what no other reads.
+  Threads(options.threads).for_each(3, [&](std::size_t task) {
+    if (task == 0) find_result(options.threads, scene);
+    if (task == 1 && start != nullptr) carried = find_start(*start, result, options, scene);
+    if (task == 2) find_links(scene);
+  });
+  if (!carried.ok()) return carried.error();
+  if (scene.has_start && !options.placed) align_start(scene);
   return scene;
 }
 

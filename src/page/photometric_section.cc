@@ -11,7 +11,6 @@
 #include "image/png.h"
 #include "page/html.h"
 #include "page/page_scene.h"
-#include "page/scene_pack.h"
 #include "page/thumbnails.h"
 #include "report/palette.h"
 
@@ -38,14 +37,11 @@ std::string picture(const PatchScene& scene, const std::vector<double>& greys, d
     image.set(x, y, grey_shade(255 * (greys[k] - low) / std::max(1.0, high - low)));
   }
   const Result<std::string> bytes = encode_png(image);
-  return bytes.ok() ? base64(bytes.value()) : "";
+  return bytes.ok() ? bytes.value() : "";
 }
 
 void draw_picture(Drawing& out, double x, double y, const std::string& png) {
-  out.raw(
-      "<image x=\"" + coordinate(x) + "\" y=\"" + coordinate(y) +
-      "\" width=\"44\" height=\"44\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," +
-      png + "\"/>");
+  out.picture(x, y, kPatch, kPatch, png);
 }
 
 std::vector<double> reference_of(const PatchScene& scene, std::uint32_t point) {
@@ -88,8 +84,9 @@ std::string strip(const PatchComparison& comparison, const PatchFit& fit) {
     x += 56;
     ++shown;
   }
-  return "<div class=\"strip\">" +
-         out.svg(620, 118, "Patches of point " + std::to_string(fit.point)) + "</div>";
+  // On a phone it scrolls by itself rather than shrink to nothing.
+  const std::string label = "Patches of point " + std::to_string(fit.point);
+  return "<div class=\"strip\">" + scrolling(label, out.svg(620, 118, label)) + "</div>";
 }
 
 std::string strips(const PhotometricPart& part) {

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
+#include "sheaf/covariance.h"
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
@@ -30,7 +32,14 @@ struct ReportOptions {
   bool in_place = false;
   int threads = 0;                               ///< 0: all
   const PhotometricPart* photometric = nullptr;  ///< of a refinement by pixels; null: none
+  /// What `report_precision` found while a survey's terms were in the problem, which has lost them
+  /// since; null: it is found here.
+  const Covariance* precision = nullptr;
 };
+
+/// How well a state is known as a report tells it, the terms of the problem counted; nothing where
+/// that is not wanted, takes too long (ReportOptions::sigmas), or nothing is determined.
+std::optional<Covariance> report_precision(const Problem& result, const ReportOptions& options);
 
 /// A report as one page of HTML that needs nothing beside it: no file, no network. before: the
 /// start, on which `after` improved, or null where there is but one state. Images and points are

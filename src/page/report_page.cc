@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,10 +26,12 @@
 #include "page/run_section.h"
 #include "page/scene_pack.h"
 #include "page/scene_view.h"
+#include "page/sensor_table.h"
 #include "page/structure_section.h"
 #include "page/survey_section.h"
 #include "page/thumbnails.h"
 #include "page/verdict.h"
+#include "platform/base64.h"
 #include "platform/parallel.h"
 #include "scene/rigs.h"
 #include "sheaf/survey.h"
@@ -137,6 +140,17 @@ std::string marks_script(const RunRecord* run, const SceneView& view) {
   return out + "]";
 }
 
+using Part = std::function<std::string()>;
+
+/// What the parts make, one behind the other; each a task of its own.
+std::string joined(const std::vector<Part>& parts, int threads) {
+  std::vector<std::string> made(parts.size());
+  Threads(threads).for_each(parts.size(), [&](std::size_t k) { made[k] = parts[k](); });
+  std::string out;
+  for (const std::string& text : made) out += text;
+  return out;
+}
+
 template <class Put>
 std::string script_list(std::size_t count, const Put& put) {
   std::string out = "[";
@@ -180,28 +194,16 @@ std::string residual_words(const PageScene& scene) {
          percent(systematic / scene.sigma) + " of the noise.";
 }
 
-std::string residual_section(const PageScene& scene) {
+std::string residual_section(const PageScene& scene, int threads) {
   constexpr std::uint64_t kFewest = 40;
   if (scene.after.counted < kFewest || !(scene.sigma > 1e-9)) return "";
+  const std::string charts =
+      joined({[&] { return distribution_chart(scene); }, [&] { return tail_chart(scene); },
+              [&] { return direction_chart(scene); }, [&] { return cell_charts(scene); },
+              [&] { return radial_chart(scene); }},
+             threads);
   return section("residuals", "Residuals", residual_words(scene),
-                 "<div class=\"grid\">" + distribution_chart(scene) + tail_chart(scene) +
-                     direction_chart(scene) + cell_charts(scene) + radial_chart(scene) + "</div>" +
-                     lens_maps(scene));
-}
-
-std::optional<Covariance> known_precision(const Problem& result, const ReportOptions& options) {
-  constexpr std::size_t kMostImages = 500, kMostObservations = 1000000;
-  if (!options.sigmas || result.num_observations() == 0 || result.num_images() > kMostImages ||
-      result.num_observations() > kMostObservations)
-    return {};
-  CovarianceOptions wanted;
-  wanted.fixed = options.fixed;
-  wanted.loss = options.loss;
-  wanted.threads = options.threads;
-  wanted.lens_motions = result.cameras.size() <= 4;
-  Result<Covariance> found = covariance(result, wanted);
-  if (!found.ok()) return {};
-  return std::move(found).value();
+                 "<div class=\"grid\">" + charts + "</div>" + lens_maps(scene));
 }
 
 std::vector<double> point_sigmas(const Covariance& known) {
@@ -224,28 +226,68 @@ std::string note_html(const PageScene& scene, const SceneView& view, const Scene
   return out;
 }
 
+std::string patches_section(const ReportOptions& options) {
+  if (options.photometric == nullptr) return "";
+  return section("patches", "Patches", photometric_words(*options.photometric),
+                 photometric_section(*options.photometric));
+}
+
+std::string images_section(const PageScene& scene, const Problem& result, const PageFacts& facts,
+                           const ReportOptions& options) {
+  return section("images", "Images", image_words(scene),
+                 image_section(scene, thumbnails(scene, result, options.images, options.threads),
+                               facts.covariance) +
+                     sensor_table(result, facts.covariance));
+}
+
+/// What a run was, at the end; nothing of a scene alone.
+std::string run_sections(const RunRecord* run) {
+  if (run == nullptr) return "";
+  return section("run", "The run", run_words(*run), run_section(*run)) +
+         section("settings", "Settings",
+                 "What made this, to the letter; bold differs from the default.",
+                 settings_section(*run));
+}
+
+std::string surveyed_section(const RunRecord* run) {
+  if (run == nullptr || !run->survey) return "";
+  return section("survey", "Survey", survey_words(*run->survey), survey_section(*run->survey));
+}
+
 std::string sections(const PageScene& scene, const Problem& result, const PageFacts& facts,
                      const ReportOptions& options) {
-  const RunRecord* run = facts.run;
-  std::string out = residual_section(scene);
-  if (options.photometric != nullptr)
-    out += section("patches", "Patches", photometric_words(*options.photometric),
-                   photometric_section(*options.photometric));
-  out += section("lenses", "Lenses", lens_words(scene), lens_section(scene, facts.covariance));
-  if (run != nullptr && run->survey)
-    out += section("survey", "Survey", survey_words(*run->survey), survey_section(*run->survey));
-  out += section("images", "Images", image_words(scene),
-                 image_section(scene, thumbnails(scene, result, options.images, options.threads),
-                               facts.covariance));
-  out += section("structure", "Structure", structure_words(scene), structure_section(scene));
-  if (run == nullptr) return out;
-  out += section("run", "The run", run_words(*run), run_section(*run));
-  return out + section("settings", "Settings",
-                       "What made this, to the letter; bold differs from the default.",
-                       settings_section(*run));
+  return joined({[&] { return residual_section(scene, options.threads); },
+                 [&] { return patches_section(options); },
+                 [&] {
+                   return section("lenses", "Lenses", lens_words(scene),
+                                  lens_section(scene, facts.covariance));
+                 },
+                 [&] { return surveyed_section(facts.run); },
+                 [&] { return images_section(scene, result, facts, options); },
+                 [&] {
+                   return section("structure", "Structure", structure_words(scene),
+                                  structure_section(scene, options.threads));
+                 },
+                 [&] { return run_sections(facts.run); }},
+                options.threads);
 }
 
 }  // namespace
+
+std::optional<Covariance> report_precision(const Problem& result, const ReportOptions& options) {
+  constexpr std::size_t kMostImages = 500, kMostObservations = 1000000;
+  if (!options.sigmas || result.num_observations() == 0 || result.num_images() > kMostImages ||
+      result.num_observations() > kMostObservations)
+    return {};
+  CovarianceOptions wanted;
+  wanted.fixed = options.fixed;
+  wanted.loss = options.loss;
+  wanted.threads = options.threads;
+  wanted.lens_motions = result.cameras.size() <= 4;
+  Result<Covariance> found = covariance(result, wanted);
+  if (!found.ok()) return {};
+  return std::move(found).value();
+}
 
 Result<std::string> report_page(const Problem* before, const Problem& after,
                                 const ReportOptions& options) {
@@ -264,17 +306,25 @@ Result<std::string> report_page(const Problem* before, const Problem& after,
   std::vector<Finding> findings;
   Threads(options.threads).for_each(2, [&](std::size_t task) {
     if (task == 0) found = page_scene(before, after, {options.in_place, options.threads});
-    if (task == 1 && after.num_observations() > 0) findings = check(after);
+    if (task == 1 && after.num_observations() > 0) findings = check(after, options.threads);
   });
   const Result<PageScene>& made = *found;
   if (!made.ok()) return made.error();
   const PageScene& scene = made.value();
-  const std::optional<Covariance> known = known_precision(after, options);
-  PageFacts facts{run ? &*run : nullptr, known ? &*known : nullptr, std::move(findings)};
+  std::optional<Covariance> own;
+  if (options.precision == nullptr) own = report_precision(after, options);
+  const Covariance* known = own ? &*own : options.precision;
+  PageFacts facts{run ? &*run : nullptr, known, std::move(findings)};
   const SceneView view =
       scene_view(scene, placed ? Vector3<double>{0, 0, 1} : Vector3<double>{0, 0, 0});
   const std::vector<double> sigmas = known ? point_sigmas(*known) : std::vector<double>();
-  const Result<ScenePack> pack = pack_scene(scene, view, sigmas);
+  std::optional<Result<ScenePack>> packed;
+  std::string told;
+  Threads(options.threads).for_each(2, [&](std::size_t task) {
+    if (task == 0) packed = pack_scene(scene, view, sigmas, {}, options.threads);
+    if (task == 1) told = sections(scene, after, facts, options);
+  });
+  const Result<ScenePack>& pack = *packed;
   if (!pack.ok()) return pack.error();
   const Verdict words = verdict(scene, facts);
   const std::string script = "(() => {\n'use strict';\n" + std::string(page_script()) + "})();\n";
@@ -294,7 +344,7 @@ Result<std::string> report_page(const Problem* before, const Problem& after,
                  {"RMS_BEFORE", scene.before.counted > 0 ? with_unit(scene.before.rms, "px") : ""},
                  {"RMS_AFTER", scene.after.counted > 0 ? with_unit(scene.after.rms, "px") : ""},
                  {"NOTE", note_html(scene, view, pack.value())},
-                 {"SECTIONS", sections(scene, after, facts, options)},
+                 {"SECTIONS", told},
                  {"META", meta_script(scene, after, view, facts.run, pack.value())},
                  {"DATA", pack.value().data},
                  {"SCRIPT", script}});

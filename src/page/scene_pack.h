@@ -29,11 +29,10 @@ struct PackLimits {
 };
 
 /// point_sigma: scene units, one for each point, or empty; not finite where not determined.
-/// Errors: memory_limit where the block cannot be compressed.
+/// threads: 0 takes all; the block does not depend on it. Errors: memory_limit where the block
+/// cannot be compressed.
 Result<ScenePack> pack_scene(const PageScene& scene, const SceneView& view,
-                             const std::vector<double>& point_sigma, const PackLimits& limits = {});
-
-/// RFC 4648, without line ends.
-std::string base64(const std::string& bytes);
+                             const std::vector<double>& point_sigma, const PackLimits& limits = {},
+                             int threads = 1);
 
 }  // namespace sheaf

@@ -62,7 +62,7 @@ std::string track_chart(const PageScene& scene) {
                    bars);
 }
 
-std::string angle_chart(const PageScene& scene) {
+std::string angle_chart(const PageScene& scene, int threads) {
   static constexpr std::array<double, 8> kEdges = {0.5, 1, 2, 4, 8, 16, 32, 64};
   static constexpr std::array<const char*, 9> kLabels = {"< ½",  "½–1",   "1–2",   "2–4", "4–8",
                                                          "8–16", "16–32", "32–64", "> 64"};
@@ -78,7 +78,7 @@ std::string angle_chart(const PageScene& scene) {
   std::vector<bool> sampled(scene.result.num_observations());
   for (std::size_t i = 0; i < sampled.size(); ++i)
     sampled[i] = scene.result.observation_point[i] % step == 0;
-  const std::vector<double> angles = ray_angles_deg(scene.result, sampled);
+  const std::vector<double> angles = ray_angles_deg(scene.result, sampled, threads);
   for (std::size_t p = 0; p < angles.size(); ++p) {
     if (p % step != 0 || scene.track[p] < 2 || !std::isfinite(angles[p])) continue;
     ++bars.counts[std::size_t(std::upper_bound(kEdges.begin(), kEdges.end(), angles[p]) -
@@ -233,10 +233,10 @@ std::string structure_words(const PageScene& scene) {
          grouped(std::int64_t(quantile(counts, 0))) + " at least.";
 }
 
-std::string structure_section(const PageScene& scene) {
+std::string structure_section(const PageScene& scene, int threads) {
   if (scene.num_points() == 0 || scene.order.empty()) return "";
   return "<div class=\"grid\">" + covisibility_chart(scene) + track_chart(scene) +
-         angle_chart(scene) + pattern_charts(scene) + "</div>";
+         angle_chart(scene, threads) + pattern_charts(scene) + "</div>";
 }
 
 }  // namespace sheaf

@@ -9,8 +9,8 @@
 namespace sheaf {
 
 /// Who sees what with whom: common points of images, lengths of tracks, angles at which rays meet,
-/// patterns of the matrices.
-std::string structure_section(const PageScene& scene);
+/// patterns of the matrices. threads: 0 takes all; the text does not depend on it.
+std::string structure_section(const PageScene& scene, int threads);
 
 /// What the margin says of it.
 std::string structure_words(const PageScene& scene);

@@ -9,7 +9,7 @@
 #include "image/jpeg.h"
 #include "image/jpeg_write.h"
 #include "io/folder_files.h"
-#include "page/scene_pack.h"
+#include "platform/base64.h"
 #include "platform/parallel.h"
 
 namespace sheaf {

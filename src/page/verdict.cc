@@ -75,7 +75,21 @@ void add_precision(const Covariance& known, bool surveyed, std::vector<Reason>& 
                        count_text(known.undetermined_points, "point is", "points are") +
                            " not determined by what is measured",
                        "leave them out (convert --min-track 2, --min-angle)"});
-  // A survey has left the problem by now, and with it what fixes the rest.
+  if (surveyed && known.deficit < 7) {
+    std::string open;
+    for (const std::string& freedom : known.freedoms) open += (open.empty() ? "" : ", ") + freedom;
+    reasons.push_back(
+        {Weight::sound,
+         known.deficit == 0
+             ? "the survey fixes where the scene lies, how it is turned and how large it is"
+             : "the survey leaves " + std::to_string(known.deficit) +
+                   " of the scene's seven freedoms" + (open.empty() ? "" : ": " + open),
+         known.deficit == 0 ? "sigmas are those of its frame: its positions, points and distances "
+                              "count in them"
+                            : "sigmas are relative to the images' mean place in these"});
+    return;
+  }
+  // Told of a survey alone, and not given its terms, nobody knows.
   if (known.deficit < 7 || surveyed) return;
   reasons.push_back({Weight::sound,
                      "where the scene lies, how it is turned and how large it is rests on no "

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "image/canvas.h"
+#include "image/png.h"
 
 namespace sheaf {
 namespace {
@@ -44,15 +44,19 @@ Color size_shade(double t) {
   return between(kStops, t);
 }
 
-void draw_colour_bar(Image& image, int x, int y, Color (*shade)(double), double from, double to,
-                     const std::string& low, const std::string& high, const std::string& what) {
-  constexpr int kWidth = 320, kBar = 24, kHeight = 16;
-  draw_text(image, x, y, what, 2, kInk);
-  for (int k = 0; k < kWidth; ++k)
-    fill_rectangle(image, x + k, y + kBar, x + k + 1, y + kBar + kHeight,
-                   shade(from + (to - from) * k / (kWidth - 1)));
-  draw_text(image, x, y + kBar + kHeight + 6, low, 2, kInk);
-  draw_text(image, x + kWidth - text_width(high, 2), y + kBar + kHeight + 6, high, 2, kInk);
+Result<void> draw_colour_bar(Drawing& out, double x, double y, Color (*shade)(double), double from,
+                             double to, const std::string& low, const std::string& high,
+                             const std::string& what) {
+  constexpr int kWidth = 320;
+  Image bar(kWidth, 1, kPaper);
+  for (int k = 0; k < kWidth; ++k) bar.set(k, 0, shade(from + (to - from) * k / (kWidth - 1)));
+  const Result<std::string> png = encode_png(bar);
+  if (!png.ok()) return png.error();
+  out.text(x, y + 14, what, "");
+  out.picture(x, y + 24, kWidth, 16, png.value());
+  out.text(x, y + 58, low, "m");
+  out.text(x + kWidth, y + 58, high, "m", Anchor::end);
+  return {};
 }
 
 }  // namespace sheaf

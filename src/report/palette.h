@@ -4,7 +4,9 @@
 
 #include <string>
 
+#include "chart/plot.h"
 #include "image/image.h"
+#include "sheaf/error.h"
 
 namespace sheaf {
 
@@ -20,9 +22,10 @@ Color signed_shade(double t);
 /// From blue (0) over yellow to red (1): small to large.
 Color size_shade(double t);
 
-/// A bar of shades(0 to 1) with its ends' labels below and what it shows above; (x, y) is its top
-/// left corner, text included.
-void draw_colour_bar(Image& image, int x, int y, Color (*shade)(double), double from, double to,
-                     const std::string& low, const std::string& high, const std::string& what);
+/// A bar of shades between two values with its ends' labels below and what it shows above; (x, y)
+/// is its top left corner, text included. Errors: as encode_png.
+Result<void> draw_colour_bar(Drawing& out, double x, double y, Color (*shade)(double), double from,
+                             double to, const std::string& low, const std::string& high,
+                             const std::string& what);
 
 }  // namespace sheaf

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "image/canvas.h"
+#include "chart/svg_file.h"
+#include "image/png.h"
 #include "report/palette.h"
 
 namespace sheaf {
@@ -112,54 +113,68 @@ class Sheet {
     zoom_ = std::max(1, kCell / std::max(scene_.grid.width, scene_.grid.rows));
   }
 
-  PatchSheet draw(const std::string& title) {
+  Result<PatchSheet> draw(const std::string& title) {
     std::size_t most = 0;
     for (const Row& row : rows_) most = std::max(most, row.columns.size());
     const int columns = static_cast<int>(most), rows = static_cast<int>(rows_.size());
-    const int width = 2 * kMargin + kWords + kPair + columns * (kPair + kPairGap);
-    PatchSheet sheet{Image(std::max(kLeastWidth, width), kTop + rows * kRow + kFoot, kPaper), {}};
-    draw_text(sheet.image, kMargin, 24, title, 3, kInk);
-    draw_text(sheet.image, kMargin, 66,
-              "the reference, then what the images show (their brightness taken out), beside it", 2,
-              kFaint);
-    draw_text(sheet.image, kMargin, 88, "the residuals; greys in brackets are black and white", 2,
-              kFaint);
+    const int width =
+        std::max(kLeastWidth, 2 * kMargin + kWords + kPair + columns * (kPair + kPairGap));
+    const int height = kTop + rows * kRow + kFoot;
+    PatchSheet sheet;
+    sheet.image = Image(width, kTop + rows * kRow, kPaper);
     for (int i = 0; i < rows; ++i) draw_row(rows_[std::size_t(i)], kTop + i * kRow, sheet);
-    draw_colour_bar(sheet.image, kMargin, kTop + rows * kRow + 12, signed_shade, -1, 1,
-                    "-" + number(scale_), "+" + number(scale_), "residual, grey levels");
+    const Result<std::string> png = encode_png(sheet.image);
+    if (!png.ok()) return png.error();
+    Drawing out;
+    out.picture(0, 0, width, sheet.image.height, png.value());
+    out.text(kMargin, 44, title, "h");
+    out.text(kMargin, 78,
+             "the reference, then what the images show (their brightness taken out), beside it",
+             "m");
+    out.text(kMargin, 98, "the residuals; greys in brackets are black and white", "m");
+    out.raw(words_.content());
+    const Result<void> bar =
+        draw_colour_bar(out, kMargin, kTop + rows * kRow + 12, signed_shade, -1, 1,
+                        "−" + number(scale_), "+" + number(scale_), "residual, grey levels");
+    if (!bar.ok()) return bar.error();
+    sheet.svg = svg_file(out, width, height, title);
     return sheet;
   }
 
  private:
-  void draw_row(const Row& row, int y, PatchSheet& sheet) const {
-    Image& image = sheet.image;
-    fill_rectangle(image, kMargin, y, image.width - kMargin, y + 1, kRule);
+  /// (x, y): the top left corner of the letters.
+  void say(int x, int y, const std::string& text, const char* classes = "") {
+    words_.text(x, y + 14, text, classes);
+  }
+
+  void draw_row(const Row& row, int y, PatchSheet& sheet) {
+    words_.path("M" + std::to_string(kMargin) + " " + std::to_string(y) + ".5H" +
+                    std::to_string(sheet.image.width - kMargin),
+                "gr");
     const int first = y + 8 + kLine, second = first + kCell + kLine;
     const std::uint32_t point = row.fit.point;
-    draw_text(image, kMargin, y + 8, "point " + std::to_string(point), 2, kInk);
-    draw_text(image, kMargin, first + 4, "before: rms", 2, kFaint);
-    draw_text(image, kMargin, first + 26, number(row.fit.before), 2, kInk);
-    draw_text(image, kMargin, second + 4, "after: rms", 2, kFaint);
-    draw_text(image, kMargin, second + 26, number(row.fit.after), 2, kInk);
+    say(kMargin, y + 8, "point " + std::to_string(point), "b");
+    say(kMargin, first + 4, "before: rms", "m");
+    say(kMargin, first + 26, number(row.fit.before));
+    say(kMargin, second + 4, "after: rms", "m");
+    say(kMargin, second + 26, number(row.fit.after), "b");
     const int x = kMargin + kWords;
-    draw_text(image, x, y + 8,
-              scene_.has_rays() ? "host " + std::to_string(scene_.host[point]) : "stored", 2, kInk);
+    say(x, y + 8, scene_.has_rays() ? "host " + std::to_string(scene_.host[point]) : "stored");
     SheetCell cell{point, 0, SheetCell::Kind::reference, x, first, zoom_, row.low, row.high};
     draw_greys(reference_of(scene_, point), cell, sheet);
-    draw_text(image, x, first + kCell + 4,
-              "(" + std::to_string(std::lround(row.low)) + "-" +
-                  std::to_string(std::lround(row.high)) + ")",
-              2, kFaint);
+    say(x, first + kCell + 4,
+        "(" + std::to_string(std::lround(row.low)) + "–" + std::to_string(std::lround(row.high)) +
+            ")",
+        "m");
     for (std::size_t c = 0; c < row.columns.size(); ++c)
       draw_column(row, row.columns[c], x + (static_cast<int>(c) + 1) * (kPair + kPairGap), y,
                   sheet);
-    if (row.left_out > 0)
-      draw_text(image, x, second + 4, "+" + std::to_string(row.left_out) + " more", 2, kFaint);
+    if (row.left_out > 0) say(x, second + 4, "+" + std::to_string(row.left_out) + " more", "m");
   }
 
-  void draw_column(const Row& row, const Column& column, int x, int y, PatchSheet& sheet) const {
+  void draw_column(const Row& row, const Column& column, int x, int y, PatchSheet& sheet) {
     const int first = y + 8 + kLine, second = first + kCell + kLine;
-    draw_text(sheet.image, x, y + 8, "image " + std::to_string(column.image), 2, kInk);
+    say(x, y + 8, "image " + std::to_string(column.image));
     SheetCell cell{row.fit.point, column.image, SheetCell::Kind::before, x, first, zoom_,
                    row.low,       row.high};
     draw_seen(column.before, cell, sheet);
@@ -169,25 +184,24 @@ class Sheet {
   }
 
   /// Grey levels and residuals side by side, with the rms below.
-  void draw_seen(const PatchGreys& seen, const SheetCell& cell, PatchSheet& sheet) const {
+  void draw_seen(const PatchGreys& seen, const SheetCell& cell, PatchSheet& sheet) {
     if (seen.grey.empty()) {
-      draw_frame(sheet.image, cell.x, cell.y, cell.x + kPair, cell.y + kCell, kRule);
-      draw_text(sheet.image, cell.x + 3, cell.y + kCell / 2 - 7, "not seen", 2, kFaint);
+      words_.rectangle(cell.x, cell.y, kPair, kCell, "mx");
+      say(cell.x + 6, cell.y + kCell / 2 - 9, "not seen", "m");
       return;
     }
     draw_greys(seen.grey, cell, sheet);
     for (std::size_t k = 0; k < seen.residual.size(); ++k)
       fill_pixel(k, cell.x + kCell + 4, cell, signed_shade(seen.residual[k] / scale_), sheet.image);
-    draw_text(sheet.image, cell.x, cell.y + kCell + 4, number(rms(seen.residual)), 2, kInk);
+    say(cell.x, cell.y + kCell + 4, number(rms(seen.residual)));
   }
 
-  void draw_greys(const std::vector<double>& greys, const SheetCell& cell,
-                  PatchSheet& sheet) const {
+  void draw_greys(const std::vector<double>& greys, const SheetCell& cell, PatchSheet& sheet) {
     for (std::size_t k = 0; k < greys.size(); ++k)
       fill_pixel(k, cell.x, cell, grey_shade(255 * (greys[k] - cell.low) / (cell.high - cell.low)),
                  sheet.image);
-    draw_frame(sheet.image, cell.x, cell.y, cell.x + cell.zoom * scene_.grid.width,
-               cell.y + cell.zoom * scene_.grid.rows, kRule);
+    words_.rectangle(cell.x, cell.y, cell.zoom * scene_.grid.width, cell.zoom * scene_.grid.rows,
+                     "mx");
     sheet.cells.push_back(cell);
   }
 
@@ -196,9 +210,12 @@ class Sheet {
     const std::uint32_t at = grid.place[k];
     const int x = left + cell.zoom * (static_cast<int>(grid.dx[at]) - grid.left);
     const int y = cell.y + cell.zoom * (static_cast<int>(grid.dy[at]) - grid.top);
-    fill_rectangle(image, x, y, x + cell.zoom, y + cell.zoom, color);
+    for (int v = y; v < y + cell.zoom; ++v)
+      for (int u = x; u < x + cell.zoom; ++u)
+        if (image.contains(u, v)) image.set(u, v, color);
   }
 
+  Drawing words_;
   const PatchScene& scene_;
   std::vector<Row> rows_;
   double scale_ = 1;
@@ -207,8 +224,8 @@ class Sheet {
 
 }  // namespace
 
-PatchSheet draw_patch_sheet(const PatchComparison& comparison, const std::vector<PatchFit>& rows,
-                            const std::string& title) {
+Result<PatchSheet> draw_patch_sheet(const PatchComparison& comparison,
+                                    const std::vector<PatchFit>& rows, const std::string& title) {
   return Sheet(comparison, rows).draw(title);
 }
 

@@ -8,6 +8,7 @@
 
 #include "image/image.h"
 #include "report/patch_comparison.h"
+#include "sheaf/error.h"
 
 namespace sheaf {
 
@@ -26,11 +27,13 @@ struct SheetCell {
 /// A row for each point: the reference, then by image what it shows, above before and below after,
 /// each beside its residuals in colour.
 struct PatchSheet {
-  Image image;
+  std::string svg;        ///< a file's text, the patches' pixels a picture below the words
+  Image image{0, 0, {}};  ///< the picture
   std::vector<SheetCell> cells;
 };
 
-PatchSheet draw_patch_sheet(const PatchComparison& comparison, const std::vector<PatchFit>& rows,
-                            const std::string& title);
+/// Errors: as encode_png.
+Result<PatchSheet> draw_patch_sheet(const PatchComparison& comparison,
+                                    const std::vector<PatchFit>& rows, const std::string& title);
 
 }  // namespace sheaf

@@ -11,9 +11,10 @@
 
 namespace sheaf {
 
-/// PNG files in a folder, which is made or replaced whole, other files in it kept:
-/// worst-patches.png and median-patches.png (six points each, by their rms after), and
-/// residuals-J.png for every image J. Returns their names. Errors: ErrorCode::unwritable_output.
+/// SVG files in a folder, which is made or replaced whole, other files in it kept:
+/// worst-patches.svg and median-patches.svg (six points each, by their rms after), and
+/// residuals-J.svg for every image J; pixels are PNG pictures in them. Returns their names. Errors:
+/// ErrorCode::unwritable_output.
 Result<std::vector<std::string>> write_pictures(const PatchComparison& comparison,
                                                 const std::vector<GreyImage>& images,
                                                 const std::filesystem::path& folder);

@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <string>
 
-#include "image/canvas.h"
+#include "chart/number_text.h"
+#include "chart/svg_file.h"
+#include "image/png.h"
 #include "report/palette.h"
 
 namespace sheaf {
@@ -47,18 +49,34 @@ double pale_grey(const GreyImage& grey, const ResidualMap& map, int x, int y) {
   return 64 + 0.7 * sum / (map.shrink * map.shrink);
 }
 
-void draw_panel(const GreyImage& grey, const std::vector<PatchSight>& sights, double scale,
-                const std::string& caption, int left, int width, int height, ResidualMap& map) {
+/// A picture of the panel's size; the same before and after.
+Image panel_image(const GreyImage& grey, const ResidualMap& map, int width, int height) {
+  Image out(width, height, kPaper);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      map.image.set(left + x, map.top + y, grey_shade(pale_grey(grey, map, x, y)));
-  draw_frame(map.image, left, map.top, left + width, map.top + height, kFaint);
+    for (int x = 0; x < width; ++x) out.set(x, y, grey_shade(pale_grey(grey, map, x, y)));
+  return out;
+}
+
+std::string hexadecimal(Color c) {
+  char text[8];
+  std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(c.red), unsigned(c.green),
+                unsigned(c.blue));
+  return text;
+}
+
+/// The worst are drawn last.
+void draw_panel(const std::string& png, const std::vector<PatchSight>& sights, double scale,
+                const std::string& caption, double left, const ResidualMap& map, Drawing& out) {
+  const double width = map.image.width, height = map.image.height;
+  out.picture(left, map.top, width, height, png);
+  out.rectangle(left, map.top, width, height, "fr");
   for (const PatchSight& sight : sights)
-    fill_circle(map.image, left + map.placed(sight.x), map.top + map.placed(sight.y), kRadius,
-                size_shade(sight.rms_grey / scale));
-  std::string words = caption + ": " + std::to_string(sights.size()) + " patches";
+    out.raw("<circle cx=\"" + coordinate(left + map.placed(sight.x) + 0.5) + "\" cy=\"" +
+            coordinate(map.top + map.placed(sight.y) + 0.5) + "\" r=\"" + coordinate(kRadius) +
+            "\" fill=\"" + hexadecimal(size_shade(sight.rms_grey / scale)) + "\"/>");
+  std::string words = caption + ": " + count_text(sights.size(), "patch", "patches");
   if (!sights.empty()) words += ", median " + number(sights[sights.size() / 2].rms_grey);
-  draw_text(map.image, left, map.top - 28, words, 2, kInk);
+  out.text(left, map.top - 10, words, "b");
 }
 
 }  // namespace
@@ -73,23 +91,29 @@ double rms_scale(const PatchComparison& comparison) {
   return std::max(kLeastScale, std::ceil(*at));
 }
 
-ResidualMap draw_residual_map(const PatchComparison& comparison, const GreyImage& grey,
-                              std::uint32_t image, double scale) {
-  ResidualMap map{Image(0, 0, kPaper)};
+Result<ResidualMap> draw_residual_map(const PatchComparison& comparison, const GreyImage& grey,
+                                      std::uint32_t image, double scale) {
+  ResidualMap map;
   map.zoom = std::max(1, kPanel / grey.width);
   map.shrink = map.zoom > 1 ? 1 : (grey.width + kMostPanel - 1) / kMostPanel;
   const int width = grey.width * map.zoom / map.shrink;
   const int height = grey.height * map.zoom / map.shrink;
-  map.image = Image(2 * kMargin + 2 * width + kGap, kTop + height + kFoot, kPaper);
+  map.image = panel_image(grey, map, width, height);
+  const Result<std::string> png = encode_png(map.image);
+  if (!png.ok()) return png.error();
   map.left_before = kMargin, map.left_after = kMargin + width + kGap, map.top = kTop;
-  draw_text(map.image, kMargin, 24, "image " + std::to_string(image) + ": residuals of its patches",
-            3, kInk);
-  draw_panel(grey, sights_in(comparison.before, image), scale, "before", map.left_before, width,
-             height, map);
-  draw_panel(grey, sights_in(comparison.after, image), scale, "after", map.left_after, width,
-             height, map);
-  draw_colour_bar(map.image, kMargin, kTop + height + 16, size_shade, 0, 1, "0",
-                  number(scale) + " and more", "rms of a patch, grey levels");
+  const std::string title = "Image " + std::to_string(image) + ": residuals of its patches";
+  Drawing out;
+  out.text(kMargin, 44, title, "h");
+  draw_panel(png.value(), sights_in(comparison.before, image), scale, "before", map.left_before,
+             map, out);
+  draw_panel(png.value(), sights_in(comparison.after, image), scale, "after", map.left_after, map,
+             out);
+  const Result<void> bar =
+      draw_colour_bar(out, kMargin, kTop + height + 16, size_shade, 0, 1, "0",
+                      number(scale) + " and more", "rms of a patch, grey levels");
+  if (!bar.ok()) return bar.error();
+  map.svg = svg_file(out, 2 * kMargin + 2 * width + kGap, kTop + height + kFoot, title);
   return map;
 }
 

@@ -33,8 +33,8 @@ std::vector<double> residuals(const Problem& problem, int threads) {
   return out;
 }
 
-std::vector<double> residual_lengths(const Problem& problem) {
-  const std::vector<double> r = residuals(problem);
+std::vector<double> residual_lengths(const Problem& problem, int threads) {
+  const std::vector<double> r = residuals(problem, threads);
   std::vector<double> lengths(problem.num_observations());
   for (std::size_t i = 0; i < lengths.size(); ++i)
     // std::hypot's bits depend on the processor.

@@ -12,8 +12,8 @@ namespace sheaf {
 /// bits do not depend on the number of threads (0: all).
 std::vector<double> residuals(const Problem& problem, int threads = 1);
 
-/// |r| of each observation, px; may be infinite or NaN.
-std::vector<double> residual_lengths(const Problem& problem);
+/// |r| of each observation, px; may be infinite or NaN. Threads as above.
+std::vector<double> residual_lengths(const Problem& problem, int threads = 1);
 
 /// Mean |r| of each point's observations, px, as COLMAP states it for points; 0 for a point without
 /// observations, and -1 (not known) where it is not finite.

@@ -27,7 +27,8 @@ class Browser:
         read_here, write_there = os.pipe()
         read_there, write_here = os.pipe()
         words = [program, "--headless=new", "--no-sandbox", "--remote-debugging-pipe",
-                 "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+                 # As on a machine without a graphics processor: pages by software, WebGL too.
+                 "--disable-gpu", "--enable-unsafe-swiftshader",
                  "--hide-scrollbars", "--no-first-run", "--disable-background-networking",
                  "--disable-component-update", "--disable-dev-shm-usage",
                  f"--user-data-dir={self.folder}", "about:blank"]

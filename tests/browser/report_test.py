@@ -3,12 +3,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reports as a reader has them: in a browser, from disk, by mouse, by keys and on paper.
 
-    report_test.py SHEAF [AXE]
+    report_test.py SHEAF [AXE] [--write]
 
 AXE: axe.min.js of axe-core, for the rules of accessibility; without it they are named as not run.
+--write: store what pages look like (looks.json) after a change that is wanted.
 Ends with 77, which ctest takes for skipped, where there is no Chromium.
 """
 
+import json
 import os
 import struct
 import subprocess
@@ -18,6 +20,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import browser  # noqa: E402
+import looks  # noqa: E402
 
 PIXELS = """(() => { const c = document.getElementById('gl'), g = c.getContext('webgl2');
 const a = new Uint8Array(c.width * c.height * 4);
@@ -60,6 +63,40 @@ def make_reports(sheaf, folder):
         file.write("\n".join(lines))
     command(sheaf, "report", at("text"), "-o", at("hostile.html"), "--title", HOSTILE, "--quiet")
     return at("bal.html"), at("hostile.html"), names
+
+
+def survey_of(folder):
+    """Every hundredth point of a text model as a control point with its marks, each fourth of them a
+    check point."""
+    names, pixels = {}, {}
+    with open(os.path.join(folder, "images.txt")) as file:
+        lines = [line.split() for line in file if not line.startswith("#")]
+    for head, features in zip(lines[::2], lines[1::2]):
+        names[head[0]] = head[9]
+        pixels[head[0]] = [(float(x), float(y)) for x, y in zip(features[::3], features[1::3])]
+    points = []
+    with open(os.path.join(folder, "points3D.txt")) as file:
+        for line in [line.split() for line in file if not line.startswith("#")][::100]:
+            marks = [{"image": names[i], "pixel": pixels[i][int(k)]} for i, k in zip(line[8::2], line[9::2])]
+            points.append({"id": "P" + line[0], "role": "check" if len(points) % 4 == 3 else "control",
+                           "xyz": [float(x) for x in line[1:4]], "sigma": 0.02, "marks": marks})
+    return {"frame": {"kind": "local"}, "points": points}
+
+
+def make_others(sheaf, folder):
+    """One of a rig with control points, one of a refinement by pixels."""
+    at = lambda name: os.path.join(folder, name)  # noqa: E731
+    command(sheaf, "generate", at("rig"), "--rigs", "stereo", "--frames", "12", "--points", "900",
+            "--truth", at("rig-truth"), "--quiet")
+    command(sheaf, "convert", at("rig-truth"), at("rig-text"), "--format", "colmap-text", "--quiet")
+    with open(at("survey.json"), "w") as file:
+        json.dump(survey_of(at("rig-text")), file)
+    command(sheaf, "solve", at("rig"), "-o", at("rig-out"), "--constraints", at("survey.json"),
+            "--report", at("rig.html"), "--quiet")
+    command(sheaf, "generate", at("looks"), "--photometric", "--quiet")
+    command(sheaf, "photometric", at("looks"), "-o", at("looks-out"), "--report", at("pixels.html"),
+            "--quiet")
+    return {"rig": at("rig.html"), "pixels": at("pixels.html")}
 
 
 def settle(page):
@@ -175,7 +212,8 @@ def main():
     if not program:
         print("skipped: no Chromium here (Debian's package: chromium)")
         return 77
-    sheaf, axe = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
+    write = "--write" in sys.argv
+    sheaf, axe = ([word for word in sys.argv[1:] if word != "--write"] + [""])[:2]
     with tempfile.TemporaryDirectory() as folder:
         bal, hostile, names = make_reports(sheaf, folder)
         page = browser.Browser(program)
@@ -193,6 +231,13 @@ def main():
                 and page.run("document.querySelectorAll('script').length") == 3)
             say("and are shown", "<script>" in page.run("document.querySelector('.cap b').textContent"))
             check_quiet(page, hostile)
+            others = make_others(sheaf, folder)
+            looks.check(page, {"bal": bal, **others}, say, write)
+            for path in others.values():
+                page.open(path)
+                check_quiet(page, path)
+                check_names(page)
+                check_accessibility(page, axe)
         finally:
             page.close()
     return 1 if failed else 0

@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
+
+#include "chart/svg_file.h"
 
 namespace sheaf {
 namespace {
@@ -33,6 +36,23 @@ TEST(Chart, AxesPlaceValues) {
   EXPECT_DOUBLE_EQ(logarithmic(10), 25);
   EXPECT_LT(logarithmic(0), -50);
   EXPECT_TRUE(std::isfinite(logarithmic(0)));
+}
+
+TEST(Chart, FilesAreSvgWithTheirStyle) {
+  Drawing drawing;
+  drawing.text_upwards(10, 90, "up & up", "m", Anchor::middle);
+  drawing.picture(1, 2, 30, 40, "foo");
+  const std::string svg = svg_file(drawing, 100, 50, "<two>");
+  EXPECT_EQ(svg.rfind("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"100\" height=\"50\"", 0),
+            0u);
+  EXPECT_NE(svg.find("<title>&lt;two&gt;</title>"), std::string::npos);
+  EXPECT_NE(svg.find("<style>"), std::string::npos);
+  EXPECT_NE(svg.find("<text transform=\"translate(10 90) rotate(-90)\" class=\"m\" "
+                     "text-anchor=\"middle\">up &amp; up</text>"),
+            std::string::npos);
+  EXPECT_NE(svg.find("<image x=\"1\" y=\"2\" width=\"30\" height=\"40\" "
+                     "preserveAspectRatio=\"none\" href=\"data:image/png;base64,Zm9v\"/>"),
+            std::string::npos);
 }
 
 TEST(Chart, PlotsAreSvgWithText) {

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "chart/number_text.h"
 #include "end_to_end/command.h"
 #include "sheaf/io.h"
 #include "survey/exif_jpeg.h"
@@ -87,6 +89,28 @@ TEST_F(ConstraintsCommand, SolveAdjustsReportsAndWritesTheFrame) {
   EXPECT_TRUE(csv.starts_with("kind,name,image,residual_x,"));
   EXPECT_NE(csv.find("\ncheck," + points_.points[8].id + ","), std::string::npos);
   EXPECT_NE(csv.find("\nposition," + made_.name(0) + ","), std::string::npos);
+}
+
+TEST_F(ConstraintsCommand, ThePageTellsWhatIsKnownWithTheSurvey) {
+  ASSERT_EQ(run({"solve", "model", "--constraints", "points.json,positions.json", "--report",
+                 "a.html", "--sigmas", "sigmas.json"})
+                .exit_code,
+            0);
+  const std::string page = contents_of(folder_ / "a.html");
+  EXPECT_NE(
+      page.find("The survey fixes where the scene lies, how it is turned and how large it is."),
+      std::string::npos);
+  EXPECT_EQ(page.find("rests on no measurement"), std::string::npos);
+  // Each image's sigmas are those of the same survey's covariance.
+  const json known = json_of(folder_ / "sigmas.json");
+  EXPECT_EQ(known["gauge"]["deficit"], 0);
+  std::size_t found = 0;
+  for (const json& image : known["images"]) {
+    double place = 0;
+    for (const double sigma : image["center_sigma"]) place += sigma * sigma;
+    found += page.find("<td>" + digits(std::sqrt(place), 2) + "</td><td>") != std::string::npos;
+  }
+  EXPECT_EQ(found, 12u);
 }
 
 TEST_F(ConstraintsCommand, CheckTellsWhatWouldBeUsed) {

@@ -125,9 +125,13 @@ TEST_F(JsonTest, SolveHasTheDocumentedKeys) {
 }
 
 TEST_F(JsonTest, InfoHasTheDocumentedKeys) {
-  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json", "--pattern", "p.png"}).exit_code, 0);
+  ASSERT_EQ(run({"info", "in.txt", "--json", "info.json", "--pattern", "p.svg"}).exit_code, 0);
   expect_documented("info", {kShared, "info"});
-  EXPECT_EQ(contents_of(folder_ / "p.png").rfind("\x89PNG", 0), 0u);
+  EXPECT_EQ(contents_of(folder_ / "p.svg").rfind("<svg ", 0), 0u);
+  const Outcome refused = run({"info", "in.txt", "--pattern", "p.PNG"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("found p.PNG, expected a name that ends in .svg"), std::string::npos)
+      << refused.err;
   ASSERT_EQ(run({"info", "in.txt", "--json", "info.json"}).exit_code, 0);
   EXPECT_TRUE(json_of(folder_ / "info.json")["pattern"].is_null());
 }

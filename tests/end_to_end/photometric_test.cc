@@ -44,17 +44,6 @@ std::size_t lines_of(const std::string& text) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-// Width and height as a PNG file's header states them, big-endian.
-std::pair<int, int> size_of_png(const std::string& bytes) {
-  const auto number = [&](std::size_t at) {
-    int out = 0;
-    for (std::size_t k = at; k < at + 4; ++k)
-      out = 256 * out + static_cast<unsigned char>(bytes[k]);
-    return out;
-  };
-  return {number(16), number(20)};
-}
-
 TEST_F(PhotometricCommand, WritesPicturesACloudAndWhatIsKnownOfPoints) {
   const Outcome outcome = run({"photometric", "scene", "-o", "refined", "--pictures", "a/pictures",
                                "--ply", "cloud.ply", "--json", "1.json"});
@@ -62,10 +51,12 @@ TEST_F(PhotometricCommand, WritesPicturesACloudAndWhatIsKnownOfPoints) {
   const auto document = json_of(folder_ / "1.json");
   EXPECT_EQ(document["pictures"].size(), 8u);
   for (const std::string name : document["pictures"])
-    EXPECT_EQ(contents_of(folder_ / ("a/pictures/" + name)).rfind("\x89PNG", 0), 0u) << name;
+    EXPECT_EQ(contents_of(folder_ / ("a/pictures/" + name)).rfind("<svg ", 0), 0u) << name;
   // Two panels of 320 x 240 pixels twice as large, with margins and a legend.
-  EXPECT_EQ(size_of_png(contents_of(folder_ / "a/pictures/residuals-5.png")),
-            std::pair(2 * 24 + 2 * 640 + 24, 108 + 480 + 104));
+  EXPECT_NE(contents_of(folder_ / "a/pictures/residuals-5.svg")
+                .find(" viewBox=\"0 0 " + std::to_string(2 * 24 + 2 * 640 + 24) + " " +
+                      std::to_string(108 + 480 + 104) + "\""),
+            std::string::npos);
   const std::string cloud = contents_of(folder_ / "cloud.ply");
   EXPECT_NE(cloud.find("element vertex 660\n"), std::string::npos) << "2 x (300 + 5 x 6)";
   EXPECT_EQ(lines_of(contents_of(folder_ / "refined/visibility.txt")), 300u);
@@ -74,8 +65,8 @@ TEST_F(PhotometricCommand, WritesPicturesACloudAndWhatIsKnownOfPoints) {
   EXPECT_EQ(document["sigma"]["of"], "inverse-depth");
   EXPECT_GT(document["inlier_share"]["after"], document["inlier_share"]["before"]);
   ASSERT_EQ(run({"photometric", "scene", "--pictures", "again"}).exit_code, 0);
-  EXPECT_EQ(contents_of(folder_ / "again/worst-patches.png"),
-            contents_of(folder_ / "a/pictures/worst-patches.png"));
+  EXPECT_EQ(contents_of(folder_ / "again/worst-patches.svg"),
+            contents_of(folder_ / "a/pictures/worst-patches.svg"));
   write_text(folder_ / "file", "");
   const Outcome broken = run({"photometric", "scene", "--pictures", "file"});
   EXPECT_EQ(broken.exit_code, 6);

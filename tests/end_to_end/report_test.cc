@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "chart/number_text.h"
 #include "end_to_end/command.h"
 
 namespace sheaf {
@@ -42,6 +44,22 @@ TEST_F(ReportCommand, SolveAndReportMakeOnePage) {
   ASSERT_EQ(
       run({"report", "in.txt", "out it.txt", "--summary", "s.json", "-o", "c.html"}).exit_code, 0);
   EXPECT_EQ(page("b.html"), page("c.html"));
+}
+
+TEST_F(ReportCommand, SensorsOfRigsHaveTheirSigmas) {
+  ASSERT_EQ(
+      run({"generate", "rig", "--rigs", "stereo", "--frames", "9", "--points", "400"}).exit_code,
+      0);
+  ASSERT_EQ(run({"solve", "rig", "--report", "a.html", "--sigmas", "sigmas.json"}).exit_code, 0);
+  const auto sensor = json_of(folder_ / "sigmas.json")["sensors"][1];
+  const auto length = [&](const char* key) {
+    double sum = 0;
+    for (const double sigma : sensor[key]) sum += sigma * sigma;
+    return digits(std::sqrt(sum), 2);
+  };
+  const std::string row = ">camera 2</th><td>0</td><td>" + length("translation_sigma") +
+                          "</td><td>" + length("rotation_sigma_deg") + "</td></tr></tbody>";
+  EXPECT_TRUE(has(page("a.html"), row)) << row;
 }
 
 TEST_F(ReportCommand, WhatIsWrongIsSaid) {

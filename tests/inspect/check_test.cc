@@ -54,6 +54,22 @@ TEST(Check, FindsNothingWrongWithAGoodProblem) {
     EXPECT_FALSE(finding.grave) << finding.words;
 }
 
+TEST(Check, FindsTheSameWithAnyNumberOfThreads) {
+  Problem p = good();
+  for (std::size_t i = 0; i < 40; i += 3) p.observation_xy[2 * i] += 300;
+  p.add_observation(p.observation_image[7], p.observation_point[7], 11, 12);
+  p.add_point(0, 0, -3);
+  p.add_observation(0, static_cast<std::uint32_t>(p.num_points() - 1), 1e7, 5);
+  const std::vector<Finding> one = check(p, 1), several = check(p, 5);
+  ASSERT_GT(one.size(), 3u);
+  ASSERT_EQ(several.size(), one.size());
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    EXPECT_EQ(several[k].code, one[k].code);
+    EXPECT_EQ(several[k].first, one[k].first);
+    EXPECT_EQ(several[k].words, one[k].words);
+  }
+}
+
 TEST(Check, FindsPartsThatNothingJoins) {
   Problem p = good();
   const std::size_t observations = p.num_observations();

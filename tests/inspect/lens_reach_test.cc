@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "geometry/lenses.h"
@@ -27,6 +29,21 @@ TEST(LensReach, KeepsTheFarthestOfEachSector) {
   int filled = 0;
   for (const auto& offset : reach.offsets) filled += offset[0] != 0;
   EXPECT_EQ(filled, 2);
+}
+
+TEST(LensReach, SectorsAreEighthsOfATurn) {
+  const auto by_angle = [](double x, double y) {
+    const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 0.5;
+    return static_cast<std::size_t>(turn * LensReach::kSectors) % LensReach::kSectors;
+  };
+  for (int k = 0; k < 720; ++k) {
+    const double angle = (k + 0.3) * std::numbers::pi / 360;
+    const double x = 7 * std::cos(angle), y = 7 * std::sin(angle);
+    EXPECT_EQ(LensReach::sector_of({x, y}), by_angle(x, y)) << k;
+  }
+  for (const double x : {-2.0, 0.0, 2.0})
+    for (const double y : {-2.0, 0.0, 2.0})
+      EXPECT_EQ(LensReach::sector_of({x, y}), by_angle(x, y)) << x << ' ' << y;
 }
 
 TEST(LensReach, CornersAreWhereThePixelsSaySo) {

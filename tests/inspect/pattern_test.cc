@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "chart/number_text.h"
 #include "inspect/network_view.h"
 #include "inspect/pattern_figure.h"
 #include "sheaf/scene.h"
@@ -50,6 +52,32 @@ TEST(Covisibility, LinksAreThoseOfTheSets) {
                 [&](std::uint32_t a, std::uint32_t b, std::uint32_t points) {
                   EXPECT_TRUE(found.emplace(std::pair(a, b), points).second);
                 });
+  EXPECT_EQ(found, links_by_sets(problem));
+}
+
+TEST(Covisibility, LinksOfManyImagesAreThoseOfTheSetsToo) {
+  constexpr std::uint32_t kImages = 1100;  // more than have a table of all pairs
+  Problem problem;
+  problem.cameras.resize(1);
+  problem.poses.resize(kImages);
+  problem.image_camera.assign(kImages, 0);
+  for (std::uint32_t p = 0; p < 700; ++p) {
+    problem.add_point(0, 0, 1);
+    // A few images far apart, one of them twice, and of some points a track that is long.
+    for (std::uint32_t k = 0; k < (p % 100 == 0 ? 60u : 4u); ++k)
+      problem.add_observation((7 * p + (k * k + 1) * 131 * (p % 3 + 1)) % kImages, p, k, 2);
+    problem.add_observation(7 * p % kImages, p, 1, 2);
+    problem.add_observation(7 * p % kImages, p, 3, 2);
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> found;
+  std::pair<std::uint32_t, std::uint32_t> last{0, 0};
+  for_each_link(problem, tracks_of(problem),
+                [&](std::uint32_t a, std::uint32_t b, std::uint32_t points) {
+                  EXPECT_LT(last, std::pair(a, b));
+                  last = {a, b};
+                  found[{a, b}] = points;
+                });
+  EXPECT_GT(found.size(), 3000u);
   EXPECT_EQ(found, links_by_sets(problem));
 }
 
@@ -159,10 +187,25 @@ TEST(PatternFigureTest, CountsAndPixelsAreThere) {
   EXPECT_EQ(figure.counts.hessian_nonzeros, 81 * 30 + 9 * 500 + 54 * n);
   EXPECT_EQ(figure.counts.reduced_columns, 270u);
   EXPECT_EQ(figure.counts.links, links_by_sets(problem).size());
-  std::size_t dark = 0;
-  for (int y = 0; y < figure.image.height; ++y)
-    for (int x = 0; x < figure.image.width; ++x) dark += figure.image.at(x, y).red < 128;
-  EXPECT_GT(dark, 10000u);
+  const auto count = [&](const std::string& part) {
+    std::size_t found = 0;
+    for (std::size_t k = figure.svg.find(part); k != std::string::npos;
+         k = figure.svg.find(part, k + 1))
+      ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<image "), 5u) << "three matrices and two bars";
+  EXPECT_EQ(count("<circle "), 30u) << "a camera each";
+  EXPECT_EQ(count("<title>a title</title>"), 1u);
+  EXPECT_EQ(count(">Jacobian " + grouped(std::int64_t(2 * n)) + " × " + grouped(270 + 1500)), 1u);
+  std::size_t drawn = 0;
+  for (std::size_t k = figure.svg.find("<path d=\""); k != std::string::npos;
+       k = figure.svg.find("<path d=\"", k + 1)) {
+    const std::string path = figure.svg.substr(k, figure.svg.find("/>", k) - k);
+    if (path.ends_with("class=\"link\""))
+      drawn += std::size_t(std::count(path.begin(), path.end(), 'M'));
+  }
+  EXPECT_EQ(drawn, figure.counts.links);
   EXPECT_FALSE(draw_patterns(Problem(), "").ok());
 }
 

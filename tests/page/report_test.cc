@@ -11,6 +11,7 @@
 
 #include "page/page_scene.h"
 #include "page/scene_pack.h"
+#include "platform/base64.h"
 #include "scene/subset.h"
 #include "sheaf/scene.h"
 #include "sheaf/solve.h"

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "chart/number_text.h"
 #include "geometry/rotation.h"
 #include "image/interpolation.h"
 #include "image/png.h"
@@ -86,7 +88,7 @@ TEST_F(PhotometricPictures, SheetsShowTheGreysOfPatches) {
   std::vector<PatchFit> rows = rank_patches(comparison_);
   for (std::size_t i = 1; i < rows.size(); ++i) EXPECT_LE(rows[i].after, rows[i - 1].after);
   rows.resize(6);
-  const PatchSheet sheet = draw_patch_sheet(comparison_, rows, "title");
+  const PatchSheet sheet = draw_patch_sheet(comparison_, rows, "a < title").value();
   const Raster picture = decoded(sheet.image);
   EXPECT_EQ(picture.width, sheet.image.width);
   EXPECT_EQ(picture.height, sheet.image.height);
@@ -117,6 +119,11 @@ TEST_F(PhotometricPictures, SheetsShowTheGreysOfPatches) {
       }
     }
   }
+  for (const char* text :
+       {"<title>a &lt; title</title>", "residual, grey levels", "data:image/png;base64,"})
+    EXPECT_NE(sheet.svg.find(text), std::string::npos) << text;
+  for (const PatchFit& row : rows)
+    EXPECT_NE(sheet.svg.find(">point " + std::to_string(row.point) + "</text>"), std::string::npos);
   EXPECT_EQ(counts[0], 6);
   EXPECT_GT(counts[1], 6);
   EXPECT_GT(counts[2], 6);
@@ -126,27 +133,41 @@ TEST_F(PhotometricPictures, MapsShowEachPatchAtItsPlace) {
   const double scale = rms_scale(comparison_);
   for (std::uint32_t j = 0; j < 2; ++j) {
     const GreyImage& grey = refined_.images[j];
-    const ResidualMap map = draw_residual_map(comparison_, grey, j, scale);
+    const ResidualMap map = draw_residual_map(comparison_, grey, j, scale).value();
     EXPECT_EQ(map.zoom, 4);
     const Raster picture = decoded(map.image);
-    EXPECT_GE(picture.width, 2 * 640);
-    EXPECT_GE(picture.height, 480);
-    // Neighbours may hide a patch, but not the one drawn last: the worst.
+    EXPECT_EQ(picture.width, 4 * grey.width);
+    EXPECT_EQ(picture.height, 4 * grey.height);
+    EXPECT_EQ(at(picture, 0, 0), grey_shade(64 + 0.7 * double(grey.pixels[0])));
+    // Every patch has a dot, in its colour and at its place; the worst are drawn last.
+    std::size_t seen = 0;
     const PatchSight* worst = nullptr;
     for (const PatchSight& sight : after_.seen)
-      if (sight.image == j && (!worst || sight.rms_grey >= worst->rms_grey)) worst = &sight;
+      if (sight.image == j) {
+        ++seen;
+        if (!worst || sight.rms_grey >= worst->rms_grey) worst = &sight;
+      }
+    for (const PatchSight& sight : comparison_.before.seen) seen += sight.image == j;
     ASSERT_NE(worst, nullptr);
-    const int x = map.left_after + static_cast<int>(std::lround(map.placed(worst->x)));
-    const int y = map.top + static_cast<int>(std::lround(map.placed(worst->y)));
-    EXPECT_EQ(at(picture, x, y), size_shade(worst->rms_grey / scale));
-    for (int left : {map.left_before, map.left_after})
-      EXPECT_EQ(at(picture, left, map.top), grey_shade(64 + 0.7 * double(grey.pixels[0])));
+    std::size_t dots = 0;
+    for (std::size_t k = map.svg.find("<circle"); k != std::string::npos;
+         k = map.svg.find("<circle", k + 1))
+      ++dots;
+    EXPECT_EQ(dots, seen);
+    const Color c = size_shade(worst->rms_grey / scale);
+    char fill[8];
+    std::snprintf(fill, sizeof fill, "#%02x%02x%02x", unsigned(c.red), unsigned(c.green),
+                  unsigned(c.blue));
+    const std::string dot = "<circle cx=\"" + coordinate(map.left_after + 4 * (worst->x + 0.5)) +
+                            "\" cy=\"" + coordinate(map.top + 4 * (worst->y + 0.5)) +
+                            "\" r=\"3\" fill=\"" + fill + "\"/>";
+    EXPECT_EQ(map.svg.rfind("<circle"), map.svg.rfind(dot)) << dot;
   }
 }
 
 TEST_F(PhotometricPictures, LargeImagesAreReduced) {
   const GreyImage grey{3000, 20, std::vector<float>(60000, 100.0f)};
-  const ResidualMap map = draw_residual_map(comparison_, grey, 0, 1);
+  const ResidualMap map = draw_residual_map(comparison_, grey, 0, 1).value();
   EXPECT_EQ(map.shrink, 3);
   EXPECT_EQ(map.left_after - map.left_before, 1000 + 24);
   EXPECT_DOUBLE_EQ(map.placed(1), 0);
@@ -155,8 +176,8 @@ TEST_F(PhotometricPictures, LargeImagesAreReduced) {
 TEST_F(PhotometricPictures, AreTheSameEveryTime) {
   const std::vector<PatchFit> rows = rank_patches(comparison_);
   const auto bytes = [&] {
-    return encode_png(draw_patch_sheet(comparison_, rows, "a").image).value() +
-           encode_png(draw_residual_map(comparison_, refined_.images[0], 0, 9).image).value();
+    return draw_patch_sheet(comparison_, rows, "a").value().svg +
+           draw_residual_map(comparison_, refined_.images[0], 0, 9).value().svg;
   };
   EXPECT_EQ(bytes(), bytes());
 }

@@ -48,8 +48,8 @@ class Renderer {
     const name = probe.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : probe.RENDERER);
     const lost = probe.getExtension('WEBGL_lose_context');
     if (lost) lost.loseContext();
-    const antialias = !/swiftshader|llvmpipe|software|basic render/i.test(name);
-    const gl = canvas.getContext('webgl2', { antialias, preserveDrawingBuffer: true, powerPreference: 'low-power' });
+    this.software = /swiftshader|llvmpipe|software|basic render/i.test(name);
+    const gl = canvas.getContext('webgl2', { antialias: !this.software, preserveDrawingBuffer: true, powerPreference: 'low-power' });
     if (!gl) throw new Error('no WebGL');
     this.gl = gl;
     this.points = this.program(POINT_SHADER, POINT_COLOUR);
@@ -157,6 +157,14 @@ class Renderer {
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     gl.bindVertexArray(null);
+    gl.deleteSync(this.fence);
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+  // Whether what was asked for last is drawn.
+  done() {
+    const gl = this.gl;
+    return !this.fence || gl.isContextLost() || gl.getSyncParameter(this.fence, gl.SYNC_STATUS) === gl.SIGNALED;
   }
 }
 
