@@ -95,7 +95,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
-                    "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses"});
+                    "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses", "--steps",
+                    "--tolerance"});
   if (verb == "info" || verb == "convert" || verb == "solve") options.insert("--rigs");
   if (verb == "check" || verb == "solve" || verb == "align") options.insert("--constraints");
   if (verb == "solve" || verb == "align") options.insert("--residuals");
