@@ -7,6 +7,7 @@
 #   scripts/install-deps.sh --ci        also clang (fuzzing) and the pinned clang-format
 #   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
+#   scripts/install-deps.sh --deb       also what scripts/build-deb.sh packages with
 # Several at once will do.
 set -euo pipefail
 
@@ -58,6 +59,8 @@ libcxx_packages() {
 }
 # A cross compiler, and an emulator that runs what it makes.
 arm64_packages=(g++-aarch64-linux-gnu qemu-user-static)
+# dpkg-buildpackage's helpers, what looks at its packages, and what reads the manual page.
+deb_packages=(dpkg-dev debhelper fakeroot lintian git man-db)
 missing_of() {
   local package
   for package in "$@"; do is_installed "$package" || echo "$package"; done
@@ -84,7 +87,9 @@ for flag in "$@"; do
     --ci) ci=true ;;
     --libcxx) libcxx=true ;;
     --arm64) wanted+=("${arm64_packages[@]}") ;;
-    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64" >&2; exit 2 ;;
+    --deb) wanted+=("${deb_packages[@]}") ;;
+    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb" >&2
+       exit 2 ;;
   esac
 done
 mapfile -t missing < <(missing_of "${wanted[@]}")
