@@ -4,7 +4,7 @@
 #
 # Installs what Sheaf needs and this Debian or Ubuntu machine lacks.
 #   scripts/install-deps.sh             to build and test
-#   scripts/install-deps.sh --ci        also clang (fuzzing) and the pinned clang-format
+#   scripts/install-deps.sh --ci        also clang (fuzzing) and the pinned clang-format and clang-tidy
 #   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
 #   scripts/install-deps.sh --deb       also what scripts/build-deb.sh packages with
@@ -46,6 +46,9 @@ ci_packages() {
   if is_installed clang-format-14 || is_offered clang-format-14; then
     echo clang-format-14
   fi
+  if is_installed clang-tidy-14 || is_offered clang-tidy-14; then
+    echo clang-tidy-14
+  fi
 }
 # Clang 16 with the library that Macs have, or what comes next to it.
 libcxx_packages() {
@@ -69,7 +72,7 @@ ci_complete() {
   $ci || return 0
   local version
   version=$(default_clang)
-  is_installed clang-format-14 && is_installed "clang-$version" &&
+  is_installed clang-format-14 && is_installed clang-tidy-14 && is_installed "clang-$version" &&
     is_installed "libclang-rt-$version-dev"
 }
 libcxx_complete() {
