@@ -8,6 +8,7 @@
 #   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
 #   scripts/install-deps.sh --deb       also what scripts/build-deb.sh packages with
+#   scripts/install-deps.sh --docs      also Doxygen, for scripts/build-docs.sh
 # Several at once will do.
 set -euo pipefail
 
@@ -91,7 +92,8 @@ for flag in "$@"; do
     --libcxx) libcxx=true ;;
     --arm64) wanted+=("${arm64_packages[@]}") ;;
     --deb) wanted+=("${deb_packages[@]}") ;;
-    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb" >&2
+    --docs) wanted+=(doxygen) ;;
+    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb, --docs" >&2
        exit 2 ;;
   esac
 done
