@@ -19,6 +19,7 @@
 #include "exit_code.h"
 #include "interrupt.h"
 #include "io/partial.h"
+#include "man_page.h"
 #include "options/options_page.h"
 #include "sheaf/error.h"
 #include "terminal.h"
@@ -92,9 +93,8 @@ void add_verb(CLI::App& app, const Verb& verb, int& exit_code) {
   added.callback([&verb, &exit_code] { exit_code = verb.run(); });
 }
 
-/// On stdout, as --version is; its end of line is added there.
-void print_options() {
-  std::string page = options_page();
+/// The page goes to stdout, as --version does; its end of line is added there.
+[[noreturn]] void print_page(std::string page) {
   page.pop_back();
   throw CLI::CallForVersion(page, 0);
 }
@@ -150,9 +150,12 @@ int run(int argc, char** argv, const std::vector<Verb>& verbs) {
   CLI::App app("Sheaf: a bundle adjustment engine.");
   app.name("sheaf");
   app.set_version_flag("--version", "sheaf " SHEAF_VERSION);
-  app.add_flag_callback("--options", print_options,
-                        "Print the page of all options of solve and photometric (docs/options.md) "
-                        "and exit");
+  app.add_flag_callback(
+      "--options", [] { print_page(options_page()); },
+      "Print the page of all options of solve and photometric (docs/options.md) and exit");
+  app.add_flag_callback(
+      "--man", [&verbs] { print_page(man_page(verbs)); },
+      "Print the manual page, sheaf(1), in the macros of man(7) and exit");
   app.require_subcommand(1);
   app.footer("Each verb explains itself: sheaf solve --help\nTo begin: sheaf demo");
   int exit_code = 0;

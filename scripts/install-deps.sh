@@ -4,9 +4,11 @@
 #
 # Installs what Sheaf needs and this Debian or Ubuntu machine lacks.
 #   scripts/install-deps.sh             to build and test
-#   scripts/install-deps.sh --ci        also clang (fuzzing), the pinned clang-format, Chromium (reports)
+#   scripts/install-deps.sh --ci        also clang (fuzzing), the pinned clang-format, Chromium
 #   scripts/install-deps.sh --libcxx    also clang with libc++, for scripts/check-libcxx.sh
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
+#   scripts/install-deps.sh --deb       also what scripts/build-deb.sh packages with
+#   scripts/install-deps.sh --docs      also Doxygen, for scripts/build-docs.sh
 # Several at once will do.
 set -euo pipefail
 
@@ -78,6 +80,8 @@ libcxx_packages() {
 }
 # A cross compiler, and an emulator that runs what it makes.
 arm64_packages=(g++-aarch64-linux-gnu qemu-user-static)
+# dpkg-buildpackage's helpers, what looks at its packages, and what reads the manual page.
+deb_packages=(dpkg-dev debhelper fakeroot lintian git man-db)
 missing_of() {
   local package
   for package in "$@"; do is_installed "$package" || echo "$package"; done
@@ -104,7 +108,10 @@ for flag in "$@"; do
     --ci) ci=true ;;
     --libcxx) libcxx=true ;;
     --arm64) wanted+=("${arm64_packages[@]}") ;;
-    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64" >&2; exit 2 ;;
+    --deb) wanted+=("${deb_packages[@]}") ;;
+    --docs) wanted+=(doxygen) ;;
+    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb, --docs" >&2
+       exit 2 ;;
   esac
 done
 mapfile -t missing < <(missing_of "${wanted[@]}")

@@ -13,7 +13,7 @@
 
 namespace sheaf {
 
-/// What stands for the place, the turn and the size of a scene where measurements do not fix them.
+/// The gauge stands for place, turn and size of a scene where measurements do not fix them.
 /// Covariances mean nothing without it (docs/covariance.md).
 enum class Gauge : std::uint8_t {
   automatic,     ///< data where these fix everything, else free_centres
@@ -34,7 +34,7 @@ enum class CovarianceSolver : std::uint8_t {
 struct CovarianceOptions {
   Gauge gauge = Gauge::automatic;
   Fixed fixed{};  ///< as in the solve: what is held has no covariance
-  /// As at the end of the solve, with its scale (of an automatic one: the last round's).
+  /// The loss is as at the end of the solve, with its scale (an automatic one's: the last round's).
   Loss loss{};
   /// Standard deviation of a residual in its own unit: px, or sigmas where there are sigmas or
   /// terms. 0: from the residuals.
@@ -90,24 +90,24 @@ struct Covariance {
   std::uint64_t rows = 0, unknowns = 0;
   double redundancy = 0;  ///< rows - unknowns + deficit
 
-  /// Of a step (rho, phi) of cam_from_world, T' = exp([rho, phi]^) T: scene units and radians. Of
-  /// an image of a rig what its frame and its sensor make of it. Zero where an image is held. Of
-  /// each image, or of image_ids in their order.
+  /// Each image has one, or each of image_ids in order: of a step (rho, phi) of cam_from_world,
+  /// T' = exp([rho, phi]^) T, in scene units and radians. An image of a rig has what its frame and
+  /// its sensor make of it. It is zero where an image is held.
   std::vector<Covariance6> poses;
   std::vector<std::array<double, 9>> centres;  ///< of camera centres, world, scene units squared
   std::vector<Covariance6> frames;             ///< of rig_from_world, likewise; zero: trivial
   std::vector<Covariance6> sensors;            ///< of sensor_from_rig
-  /// Of each lens n x n with n its model's parameters; rows of held ones are zero. Empty of lenses
-  /// that were not asked for.
+  /// Each lens has n x n with n its model's parameters; rows of held ones are zero. It is empty
+  /// where it was not asked for.
   std::vector<std::vector<double>> lenses;
-  /// Of each lens (n + 6) x (n + 6), its parameters and then the mean (rho, phi) of the images that
-  /// see something through it; empty where it was not asked for.
+  /// Each lens has (n + 6) x (n + 6): its parameters, then the mean (rho, phi) of the images that
+  /// see something through it; it is empty where it was not asked for.
   std::vector<std::vector<double>> lens_motions;
-  /// Of each of image_pairs: (rho, phi) of the first (rows) by those of the second; not numbers
+  /// Each of image_pairs has (rho, phi) of the first (rows) by those of the second; not numbers
   /// where one of them is not determined.
   std::vector<Covariance6> pairs;
   std::vector<Distance> distances;  ///< of each of image_pairs
-  /// Of each point, or of point_ids in their order; not finite where a point is not determined.
+  /// Each point has one, or each of point_ids in order; not finite where it is not determined.
   std::vector<std::array<double, 9>> points;
   std::vector<ObservationReliability> observations;
 

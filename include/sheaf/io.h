@@ -18,7 +18,7 @@ struct ReadOptions {
   bool hash = false;  ///< also compute the SHA-256 of the file's bytes, on another thread
 };
 
-/// What was read, and from what.
+/// An InputFile says what was read, and from what.
 struct InputFile {
   Problem problem;
   /// "bal", "colmap", "colmap-text", "bundler", "nvm", "libmv", "opensfm", "openmvg",

@@ -132,7 +132,7 @@ Result<StreamedScene> stream(const FamilyOptions& options, SceneState state, Sce
 /// Both states in memory.
 Result<Scene> generate(const FamilyOptions& options);
 
-/// What the sigmas of a NoiseOptions move, and in which order. w: angle-axis, C: camera centre.
+/// A protocol says what sigmas of a NoiseOptions move, in order. w: angle-axis, C: camera centre.
 enum class NoiseProtocol : std::uint8_t {
   sheaf,   ///< R <- exp(phi) R and C <- C + d, then t <- t + e: a turn leaves the centre in place
   ceres,   ///< the BAL example of Ceres Solver: w <- w + phi with C held, then t <- t + e
@@ -161,7 +161,7 @@ struct NoiseOptions {
   std::uint64_t seed = 1;
 };
 
-/// What a protocol was published with: sigmas, normalisation, filter and seed.
+/// The function returns what a protocol was published with: sigmas, normalisation, filter and seed.
 NoiseOptions published_noise(NoiseProtocol protocol);
 
 /// X -> scale (X - center).

@@ -85,7 +85,7 @@ struct SolverChange {
   std::string from, to;   ///< as Summary::solver
 };
 
-/// What happened. Costs are 1/2 sum rho(|r|^2) in px^2; without a loss rho(s) = s.
+/// A Summary says what happened. Costs are 1/2 sum rho(|r|^2) in px^2; without a loss rho(s) = s.
 struct Summary {
   double initial_cost = 0;        ///< with the first round's scale
   double final_cost = 0;          ///< with the last round's
@@ -93,7 +93,7 @@ struct Summary {
   double final_plain_cost = 0;
   double initial_rms_px = 0;  ///< per observation, of the plain residuals; sigmas take no part
   double final_rms_px = 0;
-  /// What of the costs is the terms'; the rest is the observations'.
+  /// These parts of the costs are the terms'; the rest is the observations'.
   TermCosts initial_terms, final_terms;
   std::vector<BoundReached> at_bounds;  ///< of Terms::bounds, at the end
   Termination termination = Termination::no_usable_step;
@@ -130,15 +130,15 @@ struct Summary {
   }
 };
 
-/// What a photometric refinement did. Costs are 1/2 sum rho in grey levels squared, and where
+/// The record of a photometric refinement. Costs are 1/2 sum rho in grey levels squared, and where
 /// Summary says px its numbers are grey levels here.
 struct PhotometricSummary {
   Summary solve;
   std::uint64_t patches_total = 0;    ///< a point in an image that is not its host
   std::uint64_t patches_visible = 0;  ///< of them, those that counted at the start
   std::uint64_t patches_left = 0;     ///< of those, the ones that are outside at the end
-  /// Of the residuals of the patches visible at the start, read bilinearly, brightness as it was
-  /// and as it became. A patch that left counts as much as it did, and no less than the mean did.
+  /// They are of the residuals of patches visible at the start, read bilinearly, brightness as it
+  /// was and as it became. A patch that left counts as it did, and no less than the mean did.
   double initial_rms_grey = 0, final_rms_grey = 0;
   double initial_median_grey = 0, final_median_grey = 0;    ///< of |r|
   double initial_inlier_share = 0, final_inlier_share = 0;  ///< |r| of at most 10 grey levels

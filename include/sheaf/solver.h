@@ -29,7 +29,7 @@ namespace sheaf {
 /// A solver is used by one thread at a time.
 class Solver {
  public:
-  /// What is wrong with the options is told by the first solve. lend_observations says nothing.
+  /// The first solve tells what is wrong with the options. lend_observations says nothing.
   explicit Solver(const SolveOptions& options = {});
   ~Solver();
   Solver(Solver&&) noexcept;
@@ -54,10 +54,10 @@ class Solver {
   std::unique_ptr<State> state_;
 };
 
-/// What marginalise() linearises with.
+/// These are the settings that marginalise() linearises with.
 struct MarginaliseOptions {
   Fixed fixed{};  ///< as in the solve: what is held has no columns
-  /// As at the end of the solve, its scale given. Weights are those of the residuals as they are.
+  /// The loss is as at the solve's end, its scale given. Weights are of the residuals as they are.
   Loss loss{};
 };
 

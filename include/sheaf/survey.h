@@ -17,7 +17,7 @@
 
 namespace sheaf {
 
-/// What the coordinates of a survey count in.
+/// The kind says what the coordinates of a survey count in.
 enum class WorldKind : std::uint8_t {
   local,      ///< a Cartesian frame whose numbers are small, taken as they are
   projected,  ///< metres far from their origin (UTM, a national grid, ECEF); an origin is taken off
@@ -33,7 +33,7 @@ struct WorldFrame {
   std::optional<std::array<double, 3>> origin;
 };
 
-/// Of a frame whose origin is chosen: its coordinates in the local frame, and back.
+/// Coordinates go to the local frame and back; the origin of `frame` must be chosen.
 std::array<double, 3> to_local(const WorldFrame& frame, const std::array<double, 3>& world);
 std::array<double, 3> to_world(const WorldFrame& frame, const std::array<double, 3>& local);
 
@@ -119,7 +119,7 @@ struct LensValue {
   std::uint32_t file = 0;
 };
 
-/// What a survey knows of a scene, by names.
+/// Constraints are what a survey knows of a scene, by names.
 struct Constraints {
   std::vector<std::string> paths;  ///< of the files, for messages
   WorldFrame frame;
@@ -140,7 +140,7 @@ Result<Constraints> read_constraints(const std::filesystem::path& path);
 /// Several as one: their frames are of one kind and name, and no image has two positions, no point
 /// two entries. Errors: likewise, naming both files.
 Result<Constraints> read_constraints(const std::vector<std::filesystem::path>& paths);
-/// What is text of these.
+/// The function reads the kinds that are text, from a text at hand.
 Result<Constraints> parse_constraints(const std::string& text, const std::string& name);
 
 /// A position or control point that the motion of the model leaves far from its coordinates.
@@ -150,7 +150,7 @@ struct SurveyOutlier {
   double sigmas = 0;    ///< sqrt(e^T C^-1 e)
 };
 
-/// What became of constraints in a problem.
+/// A Survey says what became of constraints in a problem.
 struct Survey {
   static constexpr std::uint32_t kNone = 0xffffffff;
 
@@ -169,7 +169,7 @@ struct Survey {
   std::vector<std::string> words;       ///< sentences about what was done
   std::vector<std::string> unused;      ///< FILE:LINE: what is not used and why
 
-  /// What the problem was before points and terms were added.
+  /// The problem had these before points and terms were added.
   std::uint64_t own_points = 0, own_observations = 0;
   bool own_sigmas = false;
   std::shared_ptr<const SceneMetadata> metadata;
@@ -184,7 +184,7 @@ struct Survey {
 Result<Survey> place_survey(Problem& problem, const Constraints& constraints,
                             const Fixed& fixed = {});
 
-/// What the motion into a survey's frame is found by.
+/// Ties are what the motion into a survey's frame is found by.
 enum class SurveyTies : std::uint8_t { all, positions, control };
 
 struct SurveyMotionOptions {
@@ -192,8 +192,8 @@ struct SurveyMotionOptions {
   bool rigid = false;  ///< the scale stays as it is
 };
 
-/// As `place_survey`, where nothing is adjusted: the motion alone, which must be determined. What
-/// it is not found by is only measured. Errors: likewise.
+/// The motion alone is found, as by `place_survey`, and must be determined; nothing is adjusted.
+/// What it is not found by is only measured. Errors: likewise.
 Result<Survey> move_to_survey(Problem& problem, const Constraints& constraints,
                               const SurveyMotionOptions& options = {});
 
@@ -206,7 +206,7 @@ struct MarkResidual {
   double sigma_px = 1;
 };
 
-/// Of a position or point: what was adjusted (a check point: triangulated) less what was stated.
+/// The residual is what was adjusted (a check point: triangulated) less what was stated.
 struct SurveyResidual {
   std::string name;                  ///< image, or id of the point
   std::array<double, 3> residual{};  ///< along the local frame's axes, its unit

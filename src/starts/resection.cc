@@ -36,7 +36,7 @@ class ImageBlock {
   ImageBlock(const Sights& sights, const std::vector<double>& points,
              const std::vector<std::uint64_t>& seen, const ScaledLoss& loss, bool pose_free,
              ParameterSet lens_held, View start)
-      : sights_(sights), points_(points), seen_(seen), loss_(loss), held_(std::move(start)) {
+      : sights_(sights), points_(points), seen_(seen), loss_(loss), held_(start) {
     const ParameterRoles roles = roles_of(held_.camera.model);
     for (int role : {roles.fx, roles.fy}) {
       if (role < 0) continue;

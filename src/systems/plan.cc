@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -119,9 +120,7 @@ double implicit_seconds(const WorkCounts& c) {
 /// Seconds a step.
 constexpr double kWorthIterating = 1e-3;
 
-std::string milliseconds(double s) {
-  return std::to_string(static_cast<long>(1e3 * s + 0.5)) + " ms";
-}
+std::string milliseconds(double s) { return std::to_string(std::lround(1e3 * s)) + " ms"; }
 
 }  // namespace
 

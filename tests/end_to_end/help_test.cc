@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -92,7 +95,8 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "demo") options.insert("--ply");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
-                    "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses"});
+                    "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses", "--steps",
+                    "--tolerance"});
   if (verb == "info" || verb == "convert" || verb == "solve") options.insert("--rigs");
   if (verb == "check" || verb == "solve" || verb == "align") options.insert("--constraints");
   if (verb == "solve" || verb == "align") options.insert("--residuals");
@@ -211,6 +215,40 @@ TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_TRUE(std::regex_match(version.out, std::regex(R"(sheaf \d+\.\d+\.\d+\n)")));
+}
+
+TEST(Command, ManualPageHasEveryVerbWithItsOptions) {
+  TemporaryFolder folder;
+  const Outcome page = run_command({"--man"}, folder.path());
+  ASSERT_EQ(page.exit_code, 0) << page.err;
+  EXPECT_EQ(page.out.rfind(".TH SHEAF 1 ", 0), 0u);
+  for (const std::string verb :
+       {"solve", "info", "check", "convert", "perturb", "evaluate", "align", "covariance",
+        "calibrate", "compare", "photometric", "report", "view", "generate", "demo"}) {
+    const std::size_t begin = page.out.find("\n.SS " + verb + "\n");
+    ASSERT_NE(begin, std::string::npos) << verb;
+    const std::string section = page.out.substr(begin, page.out.find("\n.S", begin + 1) - begin);
+    std::set<std::string> named = {"--help"};
+    const std::regex tag(R"(\n\.TP\n\\fB(?:\\-\w, )?((?:\\-|\w)+)\\fR)");
+    for (std::sregex_iterator match(section.begin(), section.end(), tag), end; match != end;
+         ++match) {
+      const std::string option = std::regex_replace((*match)[1].str(), std::regex(R"(\\-)"), "-");
+      if (option[0] == '-') named.insert(option);
+    }
+    EXPECT_EQ(named, options_of(verb)) << verb;
+  }
+}
+
+// groff reads the page as man(1) does, and warns of requests and escapes that are none.
+TEST(Command, ManualPageIsGoodRoff) {
+  if (std::system("command -v groff >/dev/null") != 0) GTEST_SKIP() << "groff is not here";
+  TemporaryFolder folder;
+  std::ofstream(folder / "sheaf.1") << run_command({"--man"}, folder.path()).out;
+  const std::string groff = "groff -man -Tascii -ww -z " + (folder / "sheaf.1") + " 2>&1";
+  const std::string into = folder / "warnings";
+  EXPECT_EQ(std::system((groff + " >" + into).c_str()), 0);
+  std::ifstream warnings(into);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(warnings), {}), "");
 }
 
 }  // namespace
