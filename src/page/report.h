@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -30,6 +32,8 @@ struct ReportOptions {
   bool in_place = false;
   int threads = 0;                               ///< 0: all
   const PhotometricPart* photometric = nullptr;  ///< of a refinement by pixels; null: none
+  StopToken stop{};  ///< asked while sigmas are computed, which are then left out
+  double time_limit_s = std::numeric_limits<double>::infinity();  ///< of the sigmas, likewise
 };
 
 /// A report as one page of HTML that needs nothing beside it: no file, no network. before: the
