@@ -14,6 +14,7 @@
 #include "covariance/noise.h"
 #include "covariance/telling.h"
 #include "covariance/weak_directions.h"
+#include "geometry/known_kinds.h"
 #include "platform/cancel.h"
 #include "platform/clock.h"
 #include "platform/real_text.h"
@@ -41,6 +42,9 @@ Result<void> check(const Problem& problem, const CovarianceOptions& options) {
   for (const std::array<std::uint32_t, 2>& pair : options.image_pairs)
     for (const std::uint32_t i : pair)
       if (i >= problem.num_images()) return image_range(i);
+  if (options.gauge > Gauge::first_two || options.solver > CovarianceSolver::conjugate_gradients)
+    return usage("the gauge or the solver is none that there is");
+  if (!is_known(options.loss.kind)) return usage("the loss is none that there is");
   if (options.loss.kind != LossKind::none && !(options.loss.scale_px > 0))
     return usage("a covariance needs the loss's scale as the solve ended with it");
   return {};

@@ -18,7 +18,7 @@ namespace {
 constexpr double kRidge = 1e-12, kRidged = 1e-3;
 constexpr double kHopeless = 1e14;
 /// Between two questions whether to go on.
-constexpr std::size_t kPoints = 1024, kTiles = 1 << 14;
+constexpr std::size_t kPoints = 64, kTiles = 1 << 14;
 
 }  // namespace
 
