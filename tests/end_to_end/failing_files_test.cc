@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,49 @@ TEST_P(FailingFiles, EndWithSixAndTheOldFileOrTheNewOne) {
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   }
   EXPECT_GE(failed, 4);  // it is opened, written, kept and renamed at least
+}
+
+/// A folder's files, one after another.
+std::string contents_of_model(const std::string& folder) {
+  std::string out;
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
+    out += contents_of(std::filesystem::path(folder) / name);
+  return out;
+}
+
+/// Where the exchange of two folders fails, the files go one by one: exit code 0 then.
+TEST(FailingFilesOfFolders, LeaveTheOldModelOrTheNewOne) {
+  TemporaryFolder folder;
+  for (const Words& command :
+       {Words{"generate", "old", "--camera", "PINHOLE", "--points", "20"},
+        Words{"generate", "in", "--camera", "PINHOLE", "--points", "30", "--seed", "3"},
+        Words{"convert", "in", "out"}})
+    ASSERT_EQ(run_command(command, folder.path()).exit_code, 0);
+  const std::string before = contents_of_model(folder / "old"),
+                    after = contents_of_model(folder / "out");
+  const Words names = folder.names();
+  int failed = 0, done = 0;
+  for (int n = 1; n <= 24; ++n) {
+    std::filesystem::remove_all(folder / "out");
+    std::filesystem::copy(folder / "old", folder / "out", std::filesystem::copy_options::recursive);
+    const Outcome outcome =
+        run_program("/bin/sh",
+                    {"-c", "SHEAF_FAILING_FILE_CALL=" + std::to_string(n) +
+                               " " SHEAF_FAILING_FILES " convert in out --quiet"},
+                    folder.path());
+    const std::string now = contents_of_model(folder / "out");
+    EXPECT_EQ(folder.names(), names) << "call " << n;
+    ++(outcome.exit_code == 0 ? done : failed);
+    if (outcome.exit_code == 0) {
+      EXPECT_EQ(now, after) << "call " << n;
+    } else {
+      EXPECT_EQ(outcome.exit_code, 6) << "call " << n << ": " << outcome.err;
+      EXPECT_TRUE(now == before || now == after) << "call " << n;
+      EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    }
+  }
+  EXPECT_GE(failed, 8);
+  EXPECT_GE(done, 4);  // there are fewer calls than 20
 }
 
 INSTANTIATE_TEST_SUITE_P(
