@@ -129,7 +129,6 @@ int run(const Arguments& arguments) {
   Progress progress(arguments.common.quiet);
   interrupt.begin_solve();
   found.summary = refine(problem, arguments, interrupt, progress);
-  interrupt.begin_write();
   progress.end();
   CovarianceOptions options;
   options.fixed.points = true;
@@ -138,18 +137,26 @@ int run(const Arguments& arguments) {
   options.threads = arguments.common.threads;
   if (arguments.loss.kind != LossKind::none)
     options.loss = {arguments.loss.kind, found.summary.rounds.back().scale_px};
+  options.stop = interrupt.token();
   found.covariance = covariance(problem, options).value();
-  found.projected = projections(arguments.projection, problem, found.covariance);
+  interrupt.begin_write();
+  const bool whole = found.covariance.ending == CovarianceEnding::whole;
+  if (whole) found.projected = projections(arguments.projection, problem, found.covariance);
   print_out("{}: {}\n", arguments.in, counts_text(problem));
   for (const std::string& view : found.left_out)
     print_out("left out    view {}: too few corners, or in a line\n", view);
   print_text(summary_text(found.summary, 0));
-  print_text(covariance_text(problem, options, found.covariance));
-  print_text(projection_text(found.projected));
+  if (whole) {
+    print_text(covariance_text(problem, options, found.covariance));
+    print_text(projection_text(found.projected));
+  } else {
+    print_out("note        no sigmas, and nothing written of them: the run was cut short\n");
+  }
   if (!arguments.out.empty() && found.summary.usable()) {
     write(problem, arguments.out).value();
     print_out("wrote       {}\n", arguments.out);
   }
+  if (!whole) return kExitInterrupted;
   write_projections(arguments.projection, problem, found.projected);
   if (!arguments.common.json.empty())
     write_json(document_of(arguments, problem, options, found), arguments.common.json);

@@ -13,6 +13,7 @@
 #include "constraints_option.h"
 #include "covariance_document.h"
 #include "covariance_fields.h"
+#include "exit_code.h"
 #include "interrupt.h"
 #include "json_document.h"
 #include "options/refinement.h"
@@ -106,6 +107,7 @@ int run(const Arguments& arguments) {
                  {"--projection", arguments.projection.csv},
                  {"--projection-figure", arguments.projection.figure}},
                 with_survey({arguments.in, arguments.rigs.path}, arguments.constraints));
+  interrupt.limit(arguments.covariance.time_limit_s);
   InputFile input = read_input(arguments.in, arguments.common);
   Problem& problem = input.problem;
   lay_rigs(arguments.rigs, input, arguments.common.quiet);
@@ -117,7 +119,15 @@ int run(const Arguments& arguments) {
   if (arguments.refinement.given())
     options.fixed = fixed_of(refinement_of(arguments.refinement, problem).value(), problem);
   const std::optional<Survey> survey = place_survey(arguments.constraints, problem, options.fixed);
+  interrupt.begin_compute();
+  options.stop = interrupt.token();
+  options.time_limit_s = interrupt.left_s();
   const Covariance found = covariance(problem, options).value();
+  if (found.ending != CovarianceEnding::whole) {
+    if (!arguments.common.quiet) print_err("the time limit was reached: nothing is written\n");
+    return exit_code_of(found.ending);
+  }
+  interrupt.begin_write();
   print_out("{}: {}\n", arguments.in, counts_text(input.problem));
   if (survey) print_text(survey_text(*survey));
   const std::vector<LensProjection> projected = projections(arguments.projection, problem, found);

@@ -27,6 +27,7 @@ const OptionTable<CovarianceOptions>& covariance_fields() {
                                     {.name = "loss", .help = "that the solve ended with"}),
       SharedFields<CovarianceOptions>::memory_limit(
           "solve for what --poses and --points name by conjugate gradients, else refuse (exit 5)"),
+      SharedFields<CovarianceOptions>::time_limit("write nothing and exit with 7"),
       C::choice(&CovarianceOptions::solver,
                 {{CovarianceSolver::automatic, "auto", "factor where it fits"},
                  {CovarianceSolver::factor, "factor", "all at once"},

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "sheaf/covariance.h"
 #include "sheaf/error.h"
 #include "sheaf/solve.h"
 
@@ -24,6 +25,18 @@ inline int exit_code_of(Termination termination) {
     default:
       return 0;
   }
+}
+
+inline int exit_code_of(CovarianceEnding ending) {
+  switch (ending) {
+    case CovarianceEnding::time_limit:
+      return kExitTimeLimit;
+    case CovarianceEnding::stopped:
+      return kExitInterrupted;
+    case CovarianceEnding::whole:
+      return 0;
+  }
+  return 0;
 }
 
 }  // namespace sheaf

@@ -20,7 +20,7 @@
 namespace sheaf {
 namespace {
 
-enum class Phase { read, solve, write, over };
+enum class Phase { read, compute, solve, write, over };
 
 /// What the handler looks at. Signals are the process's, and so is this.
 struct Watch {
@@ -55,8 +55,12 @@ double age_s() {
 
 extern "C" void take_alarm(int) {
   const int error = errno;
-  if (watch.phase == Phase::read) {
-    if (!watch.quiet) tell("the time limit was reached before all was read: nothing is written\n");
+  const Phase phase = watch.phase;
+  if (phase == Phase::read || phase == Phase::compute) {
+    if (!watch.quiet)
+      tell(phase == Phase::read
+               ? "the time limit was reached before all was read: nothing is written\n"
+               : "the time limit was reached: nothing is written\n");
     leave(kExitTimeLimit);
   }
   errno = error;
@@ -65,7 +69,7 @@ extern "C" void take_alarm(int) {
 extern "C" void take_signal(int) {
   const int error = errno;
   const Phase phase = watch.phase;
-  if (phase == Phase::read || watch.taken.fetch_add(1) > 0) leave();
+  if (phase == Phase::read || phase == Phase::compute || watch.taken.fetch_add(1) > 0) leave();
   if (!watch.quiet && phase == Phase::solve)
     tell("interrupted: the best state will be written (again: end at once without)\n");
   if (!watch.quiet && phase == Phase::write)
@@ -126,6 +130,7 @@ void Interrupt::limit(double seconds) {
 
 double Interrupt::left_s() const { return std::max(1e-9, limit_s_ - age_s()); }
 
+void Interrupt::begin_compute() { watch.phase = Phase::compute; }
 void Interrupt::begin_solve() { watch.phase = Phase::solve; }
 void Interrupt::begin_write() { watch.phase = Phase::write; }
 

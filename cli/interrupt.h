@@ -29,12 +29,14 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
-  /// A run of this verb is to end after so many seconds from the command's beginning: where it
-  /// still reads half a second later, nothing can be saved, and it ends with kExitTimeLimit.
+  /// A run of this verb is to end after so many seconds from the command's beginning: where nothing
+  /// that can be saved has begun half a second later, it ends with kExitTimeLimit.
   void limit(double seconds);
   /// Of that time; infinite without a limit, and never 0: there is always a start to write.
   double left_s() const;
 
+  /// What is computed can only be saved whole: a signal ends the command at once, as before.
+  void begin_compute();
   void begin_solve();
   void begin_write();
   StopToken token() const { return stop_.get_token(); }

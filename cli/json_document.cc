@@ -192,7 +192,8 @@ Json solve_json(const SolveRecord& record, const Summary& s, const Problem& prob
       {"input", record.input},
       {"options", record.options},
       {"rig_configuration", record.rig_configuration},
-      {"survey", nullptr},  // that of a verb which knows one takes its place
+      {"survey", nullptr},  // those of a verb which knows some take their place
+      {"sigmas", nullptr},
       {"solver", {{"name", s.solver}, {"reason", s.solver_reason}, {"changes", changes_json(s)}}},
       {"points", {{"name", s.points}, {"reason", s.points_reason}}},
       {"precision", s.precision},

@@ -76,6 +76,8 @@ ReportOptions page_options(const Arguments& arguments, const SolveOptions& solve
   options.images = arguments.images;
   options.fixed = solved.fixed;
   options.threads = solved.threads;
+  options.stop = solved.stop;
+  options.time_limit_s = solved.time_limit_s;
   options.in_place = !arguments.constraints.paths.empty();
   if (solved.loss.kind != LossKind::none)
     options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
@@ -111,21 +113,26 @@ struct SigmasWork {
   CovarianceOptions options;
   std::optional<Covariance> found;
   std::optional<Error> failed;
+  Termination ending{};  ///< of the solve, or what cut this short
 
   /// Of a run that was cut short nothing more is computed.
-  void run(const Problem& problem, const SolveOptions& solved, const Summary& summary) {
-    if (summary.termination == Termination::stopped ||
-        summary.termination == Termination::time_limit)
-      return;
+  void run(const Problem& problem, const SolveOptions& solved, const Summary& summary,
+           const Interrupt& interrupt) {
+    if (ending == Termination::stopped || ending == Termination::time_limit) return;
+    options.stop = interrupt.token();
+    options.time_limit_s = interrupt.left_s();
     options.fixed = solved.fixed;
     options.threads = solved.threads;
     if (solved.loss.kind != LossKind::none)
       options.loss = {solved.loss.kind, summary.rounds.back().scale_px};
     Result<Covariance> told = covariance(problem, options);
-    if (told.ok())
+    if (!told.ok())
+      failed = told.error();
+    else if (told.value().ending == CovarianceEnding::whole)
       found = std::move(told).value();
     else
-      failed = told.error();
+      ending = told.value().ending == CovarianceEnding::stopped ? Termination::stopped
+                                                                : Termination::time_limit;
   }
 
   // Points of the survey are gone with it by then.
@@ -135,6 +142,16 @@ struct SigmasWork {
     return path;
   }
 };
+
+SigmasWork work_out_sigmas(const Arguments& arguments, const Problem& problem,
+                           const SolveOptions& solved, const Summary& summary,
+                           const Interrupt& interrupt) {
+  SigmasWork sigmas;
+  sigmas.ending = summary.termination;
+  if (!arguments.sigmas.empty() && summary.usable())
+    sigmas.run(problem, solved, summary, interrupt);
+  return sigmas;
+}
 
 // Points of the survey leave the problem, and the summary what it says of their marks. What the
 // page tells of precision is found before that.
@@ -259,12 +276,20 @@ std::vector<NamedOutput> outputs_of(const Arguments& arguments) {
           {"--log", arguments.log},       {"--report", arguments.report}};
 }
 
+// Of sigmas that were asked for and are missing no word may be lost: JSON's `sigmas`.
+Json sigmas_json(const Arguments& arguments, const SigmasWork& sigmas) {
+  if (arguments.sigmas.empty()) return nullptr;
+  if (sigmas.found) return "written";
+  return sigmas.failed ? "failed" : "cut short";
+}
+
 // JSON and page, which tell what became of the run.
 void write_record(const Arguments& arguments, const SolveRecord& record, const SurveyWork& work,
-                  const SolveOptions& options, const Summary& summary, Problem start,
-                  const Problem& problem, std::vector<std::string>& written) {
+                  const SigmasWork& sigmas, const SolveOptions& options, const Summary& summary,
+                  Problem& start, const Problem& problem, std::vector<std::string>& written) {
   Json document = solve_json(record, summary, problem);
   document["survey"] = survey_json(work.survey, &work.report);
+  document["sigmas"] = sigmas_json(arguments, sigmas);
   if (!arguments.common.json.empty()) {
     write_json(document, arguments.common.json);
     written.push_back(arguments.common.json);
@@ -309,14 +334,13 @@ int run(Arguments& arguments) {
   const double cpu_before_s = processor_seconds();
   Summary summary = try_solve(problem, options).value();
   record.cpu_s = processor_seconds() - cpu_before_s;
-  interrupt.begin_write();
   progress.end();
 
   const Timer writing;
   record.after = evaluate(problem);
   record.agrees = agrees(summary, record.after, problem);
-  SigmasWork sigmas;
-  if (!arguments.sigmas.empty() && summary.usable()) sigmas.run(problem, options, summary);
+  SigmasWork sigmas = work_out_sigmas(arguments, problem, options, summary, interrupt);
+  interrupt.begin_write();
   finish(arguments, options, work, problem, summary);
   if (work.survey) record.after = evaluate(problem);
   std::vector<std::string> written;
@@ -326,14 +350,15 @@ int run(Arguments& arguments) {
   say(arguments, input, record, work, sigmas, summary, held);
   if (wants_json) {
     record.total_s = total.seconds();
-    write_record(arguments, record, work, options, summary, std::move(start), problem, written);
+    options.time_limit_s = interrupt.left_s();
+    write_record(arguments, record, work, sigmas, options, summary, start, problem, written);
   }
   if (!written.empty()) print_out("wrote       {}\n", fmt::join(written, ", "));
   if (summary.usable() && !arguments.out.empty())
     print_losses(write_format(problem, arguments.out), problem);
   if (sigmas.failed) throw *sigmas.failed;
   log.end(summary);
-  return exit_code_of(summary.termination);
+  return exit_code_of(sigmas.ending);
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 //
 // Problems made of any numbers and names: a format either refuses to write one, and then leaves
 // what was there under the name, or what it wrote is read again with as many images and
-// observations.
+// observations, the points that are seen where they were, and images of the same names where the
+// format has these.
 
 #include <fuzzer/FuzzedDataProvider.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -31,10 +34,12 @@ void require(bool condition, const std::string& what) {
 }
 
 double number(FuzzedDataProvider& from) {
-  switch (from.ConsumeIntegralInRange(0, 4)) {
+  switch (from.ConsumeIntegralInRange(0, 5)) {
     case 0:
-      return from.ConsumeFloatingPointInRange<double>(-1e60, 1e60);
+      return from.ConsumeFloatingPointInRange<double>(-1.5e308, 1.5e308);
     case 1:
+      return from.ConsumeFloatingPointInRange<double>(-1e60, 1e60);
+    case 2:
       return from.ConsumeIntegralInRange(-9, 9);
     default:
       return from.ConsumeFloatingPointInRange<double>(-3, 3);
@@ -101,6 +106,38 @@ const std::vector<Target>& targets() {
   return kAll;
 }
 
+/// Coordinates of the points that are seen, each of the three sorted by itself, once for each
+/// observation: what no order of points or observations changes.
+std::array<std::vector<double>, 3> seen_points(const sheaf::Problem& problem) {
+  std::array<std::vector<double>, 3> out;
+  for (const std::uint32_t p : problem.observation_point)
+    for (std::size_t k = 0; k < 3; ++k) out[k].push_back(problem.points[3 * std::size_t(p) + k]);
+  for (std::vector<double>& list : out) std::sort(list.begin(), list.end());
+  return out;
+}
+
+std::vector<std::string> sorted_names(const sheaf::Problem& problem) {
+  if (problem.metadata == nullptr) return {};
+  std::vector<std::string> out = problem.metadata->image_names;
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// What is read again beside the counts. Formats may hold coordinates as texts of some digits.
+void compare(const sheaf::Problem& problem, const sheaf::Problem& again, const std::string& format,
+             const sheaf::FormatHolds& holds) {
+  const auto before = seen_points(problem), after = seen_points(again);
+  const double digits = holds.doubles ? 1e-12 : 1e-5;
+  for (std::size_t k = 0; k < 3; ++k) {
+    double largest = 1;
+    for (const double x : before[k]) largest = std::max(largest, std::abs(x));
+    for (std::size_t i = 0; i < before[k].size(); ++i)
+      require(std::abs(before[k][i] - after[k][i]) <= digits * largest, format + ": points");
+  }
+  if (holds.names && !sorted_names(problem).empty())
+    require(sorted_names(problem) == sorted_names(again), format + ": names");
+}
+
 void check(const sheaf::Problem& problem, const Target& target, const fs::path& folder) {
   const fs::path path = folder / target.name;
   fs::remove_all(path);
@@ -123,6 +160,8 @@ void check(const sheaf::Problem& problem, const Target& target, const fs::path& 
   require(again.value().num_images() == problem.num_images(), target.format + ": images");
   require(again.value().num_observations() == problem.num_observations(),
           target.format + ": observations");
+  compare(problem, again.value(), target.format,
+          format == nullptr ? sheaf::FormatHolds{} : format->holds);
 }
 
 }  // namespace

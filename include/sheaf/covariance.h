@@ -4,12 +4,14 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -53,6 +55,15 @@ struct CovarianceOptions {
   int threads = 0;                       ///< 0: as many as the machine offers
   std::uint64_t memory_limit_bytes = 0;  ///< 0: none; else refuse what is forecast to exceed it
   CovarianceSolver solver = CovarianceSolver::automatic;
+  StopToken stop;  ///< asked between parts of the work, at least every tenth of a second or about
+  double time_limit_s = std::numeric_limits<double>::infinity();  ///< of the call, s
+};
+
+/// How the work ended.
+enum class CovarianceEnding : std::uint8_t {
+  whole,
+  stopped,     ///< by the stop token: nothing is told
+  time_limit,  ///< likewise
 };
 
 /// Row-major; of what is held or not determined every number is 0 or not finite, as said.
@@ -116,11 +127,14 @@ struct Covariance {
   std::uint64_t undetermined_points = 0;
   CovarianceSolver solver = CovarianceSolver::factor;  ///< that was used
   double seconds = 0;
+  /// Unless it is `whole`, everything but `seconds` is as in a Covariance of nothing.
+  CovarianceEnding ending = CovarianceEnding::whole;
 };
 
 /// Covariances of all that is free, at the state of the problem, which should be an optimum.
 /// Errors: usage for a problem that `validate` refuses, options that contradict it, a gauge that
-/// does not suit; memory_limit.
+/// does not suit; a time limit that is not above 0; memory_limit. A call that is stopped or out of
+/// time is no error: see Covariance::ending.
 Result<Covariance> covariance(const Problem& problem, const CovarianceOptions& options = {});
 
 /// Where on an image a lens's uncertainty is told of.

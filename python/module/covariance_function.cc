@@ -17,6 +17,7 @@
 #include "keyword_options.h"
 #include "options/refinement.h"
 #include "options/shared_options.h"
+#include "running.h"
 #include "sheaf/covariance.h"
 #include "survey_use.h"
 #include "verb.h"
@@ -140,8 +141,9 @@ nb::object covariance_of(const ProblemHandle& held, const nb::kwargs& keywords) 
         fixed_of(refinement_of(arguments.refinement, use.problem()).value(), use.problem());
   std::optional<Problem> placed;
   std::optional<Covariance> found;
-  {
-    const nb::gil_scoped_release released;
+  Run run;
+  options.stop = run.token();
+  run.go([&] {
     if (constraints) {
       placed = use.problem();
       place_survey(*placed, *constraints, options.fixed).value();
@@ -150,6 +152,10 @@ nb::object covariance_of(const ProblemHandle& held, const nb::kwargs& keywords) 
     // Points of the survey are no points of the problem.
     if (constraints && options.point_ids.empty() && options.points)
       found->points.resize(use.problem().num_points());
+  });
+  if (found->ending == CovarianceEnding::time_limit) {
+    PyErr_SetString(PyExc_TimeoutError, "the time limit was reached before the covariance ended");
+    throw nb::python_error();
   }
   return object_of(use.problem(), *found);
 }

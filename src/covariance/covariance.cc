@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <new>
 
@@ -13,6 +14,8 @@
 #include "covariance/noise.h"
 #include "covariance/telling.h"
 #include "covariance/weak_directions.h"
+#include "geometry/known_kinds.h"
+#include "platform/cancel.h"
 #include "platform/clock.h"
 #include "platform/real_text.h"
 
@@ -25,6 +28,7 @@ Result<void> check(const Problem& problem, const CovarianceOptions& options) {
   if (problem.num_observations() == 0) return usage("the problem has no observations");
   if (!(options.sigma >= 0) || !std::isfinite(options.sigma))
     return usage("the sigma must be finite and not below 0");
+  if (!(options.time_limit_s > 0)) return usage("the time limit must be above 0");
   for (const std::uint32_t p : options.point_ids)
     if (p >= problem.num_points())
       return usage("point " + std::to_string(p) + " is not one of the " +
@@ -38,6 +42,9 @@ Result<void> check(const Problem& problem, const CovarianceOptions& options) {
   for (const std::array<std::uint32_t, 2>& pair : options.image_pairs)
     for (const std::uint32_t i : pair)
       if (i >= problem.num_images()) return image_range(i);
+  if (options.gauge > Gauge::first_two || options.solver > CovarianceSolver::conjugate_gradients)
+    return usage("the gauge or the solver is none that there is");
+  if (!is_known(options.loss.kind)) return usage("the loss is none that there is");
   if (options.loss.kind != LossKind::none && !(options.loss.scale_px > 0))
     return usage("a covariance needs the loss's scale as the solve ended with it");
   return {};
@@ -145,11 +152,7 @@ void add_words(const GaugeWeights& weights, const std::vector<std::string>& note
                         " more parameters or pairs are not determined");
 }
 
-}  // namespace
-
-Result<Covariance> covariance(const Problem& given, const CovarianceOptions& options) {
-  const Stopwatch clock;
-  if (const Result<void> good = check(given, options); !good.ok()) return good.error();
+Result<Covariance> find(const Problem& given, const CovarianceOptions& options) {
   try {
     Problem placed;
     const Problem* problem = &given;
@@ -185,11 +188,31 @@ Result<Covariance> covariance(const Problem& given, const CovarianceOptions& opt
     if (const Result<void> done = inverting.run(); !done.ok()) return done.error();
     out.weak = weak_directions(*problem, out.lenses);
     add_words(weights.value(), inverting.notes(), out);
-    out.seconds = clock.seconds();
     return out;
   } catch (const std::bad_alloc&) {
     return Error(ErrorCode::memory_limit, "the machine has no memory left for the covariance");
   }
+}
+
+}  // namespace
+
+Result<Covariance> covariance(const Problem& given, const CovarianceOptions& options) {
+  const Stopwatch clock;
+  if (const Result<void> good = check(given, options); !good.ok()) return good.error();
+  const std::function<bool()> asked = [&] {
+    return options.stop.stop_requested() || clock.seconds() >= options.time_limit_s;
+  };
+  Result<Covariance> found = Covariance();
+  try {
+    const CancelScope scope(asked);
+    poll_cancelled();
+    found = find(given, options);
+  } catch (const Cancelled&) {
+    found.value().ending =
+        options.stop.stop_requested() ? CovarianceEnding::stopped : CovarianceEnding::time_limit;
+  }
+  if (found.ok()) found.value().seconds = clock.seconds();
+  return found;
 }
 
 }  // namespace sheaf

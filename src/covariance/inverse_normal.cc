@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "eliminate/kernel_table.h"
+#include "platform/cancel.h"
 #include "platform/memory.h"
 #include "reduced/sparse_cholesky.h"
 
@@ -16,6 +17,8 @@ namespace {
 /// that comes near its inverse is the ridge's.
 constexpr double kRidge = 1e-12, kRidged = 1e-3;
 constexpr double kHopeless = 1e14;
+/// Between two questions whether to go on.
+constexpr std::size_t kPoints = 64, kTiles = 1 << 14;
 
 }  // namespace
 
@@ -50,7 +53,7 @@ bool InverseNormal::factor(SparseCholesky& cholesky, double ridge, Threads& thre
   takes.erase(std::unique(takes.begin(), takes.end()), takes.end());
   for (const auto& [owner, t] : takes) ++first[static_cast<std::size_t>(owner) + 1];
   for (std::size_t s = 1; s < first.size(); ++s) first[s] += first[s - 1];
-  return cholesky.factor(threads, [&](std::size_t s) {
+  const auto fill = [&](std::size_t s) {
     const Supernode& node = symbolic.supernodes[s];
     for (std::uint64_t i = first[s]; i < first[s + 1]; ++i) {
       const std::uint64_t t = takes[i].second;
@@ -69,7 +72,10 @@ bool InverseNormal::factor(SparseCholesky& cholesky, double ridge, Threads& thre
           cholesky.panels()[cholesky.offset(r, c)] = value;
         }
     }
-  });
+  };
+  const bool done = cholesky.factor(threads, fill, cancel_question());
+  if (!done) poll_cancelled();
+  return done;
 }
 
 /// M = A C and N = A C A^T, C the inverse under minimal constraints: one solve for each freedom.
@@ -91,6 +97,7 @@ void InverseNormal::solve_gauge(const Problem& problem, const GaugeWeights& weig
   };
   const bool by_points = !at_points_.empty();
   for (std::size_t p = 0; by_points && p < problem.num_points(); ++p) {
+    if (p % kPoints == 0) poll_cancelled();
     equations_.point(p, point);
     if (!point.determined) continue;
     weights_of(p);
@@ -103,6 +110,7 @@ void InverseNormal::solve_gauge(const Problem& problem, const GaugeWeights& weig
                   point.W[b][9 * i + r] * point.inverse[3 * i + l] * a[3 * k + l];
   }
   for (std::size_t k = 0; k < d; ++k) {
+    poll_cancelled();
     for (const std::int32_t c : pinned_) M_[n * k + static_cast<std::size_t>(c)] = 0;
     cholesky.solve(&M_[n * k]);
     for (const std::int32_t c : pinned_) M_[n * k + static_cast<std::size_t>(c)] = 0;
@@ -113,6 +121,7 @@ void InverseNormal::solve_gauge(const Problem& problem, const GaugeWeights& weig
       for (std::size_t c = 0; c < n; ++c)
         N_[d * k + l] += weights.of_columns[n * l + c] * M_[n * k + c];
   for (std::size_t p = 0; by_points && p < problem.num_points(); ++p) {
+    if (p % kPoints == 0) poll_cancelled();
     equations_.point(p, point);
     if (!point.determined) continue;
     weights_of(p);
@@ -196,6 +205,7 @@ void InverseNormal::solve_functions(SparseCholesky& cholesky) {
           X[n * i + static_cast<std::size_t>(blocks.first[part.block]) + k] +=
               part.by[blocks.width(part.block) * i + k];
     for (std::size_t i = 0; i < function.rows; ++i) {
+      poll_cancelled();
       for (const std::int32_t c : pinned_) X[n * i + static_cast<std::size_t>(c)] = 0;
       cholesky.solve(&X[n * i]);
       for (const std::int32_t c : pinned_) X[n * i + static_cast<std::size_t>(c)] = 0;
@@ -226,6 +236,7 @@ void InverseNormal::take_inverse(const SparseCholesky& cholesky) {
   BlockTiles& tiles = equations_.tiles();
   const double* panels = cholesky.panels();
   for (std::uint64_t t = 0; t < tiles.size(); ++t) {
+    if (t % kTiles == 0) poll_cancelled();
     const std::uint32_t a = tiles.row(t), b = tiles.column(t);
     double* to = tiles.at(t);
     for (std::int32_t r = blocks.first[a]; r < blocks.first[a + 1]; ++r)
@@ -267,12 +278,14 @@ Result<std::unique_ptr<InverseNormal>> InverseNormal::make(
   for (std::uint64_t t = 0; t < equations.tiles().size(); ++t)
     if (equations.tiles().row(t) != equations.tiles().column(t))
       pattern.push_back({equations.tiles().row(t), equations.tiles().column(t)});
+  poll_cancelled();
   const auto analysis = analyse_columns(blocks.as_columns(), pattern);
   const std::uint64_t needed = peak_resident_bytes() + SparseCholesky::bytes(analysis->symbolic) +
                                SparseCholesky::invert_bytes(analysis->symbolic);
   if (memory_limit_bytes > 0 && needed > memory_limit_bytes)
     return Error(ErrorCode::memory_limit, "the covariance would need " + megabytes(needed) +
                                               ", the limit is " + as_given(memory_limit_bytes));
+  poll_cancelled();
   SparseCholesky cholesky({analysis, &analysis->symbolic}, available_kernels().front()->name);
   if (!out->factor(cholesky, 0, threads)) {
     out->ridged_ = true;

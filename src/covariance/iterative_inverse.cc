@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "platform/cancel.h"
+
 namespace sheaf {
 namespace {
 
@@ -146,7 +148,8 @@ void IterativeInverse::precondition_in_gauge(const std::vector<double>& r,
   into_gauge(z);
 }
 
-bool IterativeInverse::descend(const std::vector<double>& b, std::vector<double>& y) const {
+bool IterativeInverse::descend(const std::vector<double>& b, std::vector<double>& y,
+                               const std::function<bool()>* cancelled) const {
   const std::size_t n = b.size();
   const std::uint64_t most = std::max<std::uint64_t>(kFewest, 3 * n);
   std::vector<double> r = b, z(n), Sp(n);
@@ -157,6 +160,7 @@ bool IterativeInverse::descend(const std::vector<double>& b, std::vector<double>
   std::vector<double> p = z;
   PastResiduals past;
   for (std::uint64_t k = 0; k < most && rz > goal; ++k) {
+    if (cancelled != nullptr && (*cancelled)()) return false;
     past.keep(r, z, rz);
     multiply(p, Sp);
     const double curvature = dot(p, Sp);
@@ -181,6 +185,8 @@ std::vector<double> IterativeInverse::solve(const LinearFunction& function) cons
   const ParameterBlocks& blocks = equations_.blocks();
   const auto n = static_cast<std::size_t>(blocks.columns());
   std::vector<double> out(function.rows * n, 0);
+  // Rows are long, and those of other threads would be waited for: each asks by itself.
+  const std::function<bool()>* cancelled = cancel_question();
   threads_.for_each(function.rows, [&](std::size_t row) {
     std::vector<double> b(n, 0), y;
     for (const LinearPart& part : function.parts)
@@ -188,7 +194,7 @@ std::vector<double> IterativeInverse::solve(const LinearFunction& function) cons
         b[static_cast<std::size_t>(blocks.first[part.block]) + k] +=
             part.by[blocks.width(part.block) * row + k];
     into_range(b);
-    if (!descend(b, y)) {
+    if (!descend(b, y, cancelled)) {
       ++unfinished_;
       y.assign(n, std::numeric_limits<double>::infinity());
     } else {
@@ -196,6 +202,7 @@ std::vector<double> IterativeInverse::solve(const LinearFunction& function) cons
     }
     std::copy(y.begin(), y.end(), &out[n * row]);
   });
+  poll_cancelled();
   return out;
 }
 

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "covariance/inverse.h"
@@ -39,7 +40,9 @@ class IterativeInverse : public Inverse {
                               const LinearFunction& function) const;
   void into_range(std::vector<double>& b) const;
   void into_gauge(std::vector<double>& y) const;
-  bool descend(const std::vector<double>& b, std::vector<double>& y) const;
+  /// False where it does not end, or was cancelled.
+  bool descend(const std::vector<double>& b, std::vector<double>& y,
+               const std::function<bool()>* cancelled) const;
   void multiply(const std::vector<double>& x, std::vector<double>& y) const;
   void precondition(const std::vector<double>& r, std::vector<double>& z) const;
   void precondition_in_gauge(const std::vector<double>& r, std::vector<double>& z) const;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "covariance/small_cholesky.h"
+#include "platform/cancel.h"
 #include "scene/terms.h"
 
 namespace sheaf {
@@ -13,6 +14,12 @@ namespace {
 
 /// Far below what rounding leaves of a point's V: what is lost is not there.
 constexpr double kSingular = 1e-13;
+
+/// Passes over the points ask so often whether to go on: a point that a thousand images see takes a
+/// tenth of a second.
+void poll_at(std::size_t point) {
+  if (point % 4 == 0) poll_cancelled();
+}
 
 /// Pairs of blocks that some row or some point couples: a bit of each pair that there may be, or a
 /// list where these would be too many.
@@ -162,6 +169,7 @@ void NormalEquations::make_pattern() {
       for (const std::uint32_t b : term.blocks) pairs.add(std::max(a, b), std::min(a, b));
   std::vector<std::uint32_t> seen;
   for (std::size_t p = 0; p < problem_.num_points(); ++p) {
+    poll_at(p);
     seen.clear();
     for (const std::uint64_t* i = begin_of(p); i != end_of(p); ++i) {
       const std::uint32_t image = problem_.observation_image[*i];
@@ -302,6 +310,7 @@ void NormalEquations::add_points() {
     add_observation(row, weight);
   };
   for (std::size_t p = 0; p < problem_.num_points(); ++p) {
+    poll_at(p);
     point(p, of, add);
     if (points_held_ || !of.seen) continue;
     ++eliminated_;
@@ -337,6 +346,7 @@ std::vector<double> NormalEquations::gram(const std::vector<double>& G, std::siz
   };
   ObservationRows::Row row;
   for (std::size_t p = 0; p < problem_.num_points(); ++p) {
+    poll_at(p);
     of_point(p, of.data());
     for (const std::uint64_t* i = begin_of(p); i != end_of(p); ++i) {
       rows_.evaluate(*i, row);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "geometry/camera_model.h"
+#include "geometry/known_kinds.h"
 #include "sheaf/covariance.h"
 #include "starts/bearing.h"
 
@@ -61,6 +62,7 @@ Result<ProjectionUncertainty> projection_uncertainty(const Camera& camera,
                                                      const std::vector<double>& lens_motion,
                                                      const ProjectionGrid& grid) {
   const auto usage = [](const char* text) { return Error(ErrorCode::usage, text); };
+  if (!is_known(camera.model)) return usage("the camera's model is none that there is");
   const std::size_t all = parameter_count(camera.model) + 6;
   if (lens_motion.size() != all * all)
     return usage("projection uncertainty needs the covariance of the lens and its images' motion");

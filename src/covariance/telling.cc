@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
+#include "platform/cancel.h"
 #include "starts/sights.h"
 
 namespace sheaf {
@@ -79,6 +81,9 @@ class Telling {
     return out;
   }
 
+  /// Points of long tracks take their time, on every thread.
+  bool is_cancelled() const { return cancelled_ != nullptr && (*cancelled_)(); }
+
   void tell_poses() {
     const bool all = options_.image_ids.empty();
     const std::size_t count = all ? problem_.num_images() : options_.image_ids.size();
@@ -107,6 +112,7 @@ class Telling {
     return out;
   }
   void tell_pose(std::size_t image) {
+    poll_cancelled();
     const Covariance6& pose =
         out_.poses.emplace_back(of_pose(function_of_image(equations_, image)));
     // The centre moves by -R^T rho.
@@ -123,6 +129,7 @@ class Telling {
   void tell_lenses() {
     const std::vector<std::uint8_t> wanted = asked(problem_.cameras.size(), problem_.image_camera);
     for (std::size_t c = 0; c < problem_.cameras.size(); ++c) {
+      poll_cancelled();
       std::vector<double>& C = out_.lenses.emplace_back();
       if (wanted[c] == 0) continue;
       const LinearFunction function = function_of_lens(blocks_, c);
@@ -152,6 +159,7 @@ class Telling {
   }
   void tell_pairs() {
     for (std::size_t k = 0; k < joint_.of_pair.size(); ++k) {
+      poll_cancelled();
       const auto [a, b] = joint_.of_pair[k];
       const Covariance6 common = unscaled(a, b);
       Covariance6& C = out_.pairs.emplace_back(common);
@@ -213,7 +221,7 @@ class Telling {
     const std::size_t grain = factored_ != nullptr ? 256 : count + 1;
     threads_.for_ranges(count, grain, [&](std::size_t k, std::size_t end) {
       NormalEquations::Point point;
-      for (; k < end; ++k) {
+      for (; k < end && !is_cancelled(); ++k) {
         const std::size_t p = all ? k : options_.point_ids[k];
         const auto kept = std::lower_bound(blocks_.kept.begin(), blocks_.kept.end(), p);
         if (kept != blocks_.kept.end() && *kept == p) {
@@ -234,6 +242,7 @@ class Telling {
         for (double& x : out_.points[k]) x *= variance_;
       }
     });
+    poll_cancelled();
     out_.undetermined_points =
         static_cast<std::uint64_t>(std::count(lost.begin(), lost.end(), std::uint8_t(1)));
   }
@@ -243,7 +252,7 @@ class Telling {
     threads_.for_ranges(problem_.num_points(), 256, [&](std::size_t p, std::size_t end) {
       NormalEquations::Point point;
       ObservationRows::Row row;
-      for (; p < end; ++p) {
+      for (; p < end && !is_cancelled(); ++p) {
         if (equations_.begin_of(p) == equations_.end_of(p)) continue;
         equations_.point(p, point);
         for (const std::uint64_t* i = equations_.begin_of(p); i != equations_.end_of(p); ++i) {
@@ -252,6 +261,7 @@ class Telling {
         }
       }
     });
+    poll_cancelled();
   }
   ObservationReliability reliability(const NormalEquations::Point& point,
                                      const ObservationRows::Row& row) const {
@@ -276,6 +286,7 @@ class Telling {
   const ParameterBlocks& blocks_;
   const double variance_;
   Covariance& out_;
+  const std::function<bool()>* const cancelled_ = cancel_question();
 };
 
 }  // namespace

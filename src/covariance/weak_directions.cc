@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "geometry/camera_model.h"
+#include "platform/cancel.h"
 #include "platform/real_text.h"
 #include "starts/bearing.h"
 #include "starts/sights.h"
@@ -45,6 +46,7 @@ std::vector<Reach> reach_of(const Problem& problem) {
   std::vector<Matrix3<double>> R;
   for (const Pose& pose : problem.poses) R.push_back(matrix_from_quaternion(pose.rotation));
   for (std::size_t i = 0; i < problem.num_observations(); ++i) {
+    if (i % 4096 == 0) poll_cancelled();
     const std::uint32_t image = problem.observation_image[i];
     const std::uint32_t camera = problem.image_camera[image];
     const double* X = &problem.points[3 * std::size_t(problem.observation_point[i])];

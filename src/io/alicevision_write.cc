@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,14 @@ struct Intrinsics {
   std::vector<double> distortion;
 };
 
+constexpr const char* kNoFocals = "its focal lengths, or their ratio, are not above 0 and finite";
+
+/// Both above 0, and so what is stated of them.
+bool has_focals(const BrownLens& lens) {
+  const auto is_stated = [](double x) { return x > 0 && std::isfinite(kSensorWidth_mm * x); };
+  return is_stated(lens.fx) && is_stated(lens.fy) && is_stated(lens.fy / lens.fx);
+}
+
 Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
   const auto refuse = [&](const std::string& why) {
     return Error(ErrorCode::usage,
@@ -61,10 +70,10 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
   if (camera.width_px == 0 || camera.height_px == 0)
     return refuse("its images' size is not known, which focal lengths count by");
   const auto& k = camera.parameters;
-  if (!(k[0] > 0)) return refuse("its focal length is not above 0");
   Intrinsics out;
   if (camera.model == CameraModel::opencv_fisheye || camera.model == CameraModel::fov) {
     out.lens = {k[0], k[1], k[2], k[3], {}, {}};
+    if (!has_focals(out.lens)) return refuse(kNoFocals);
     const bool fov = camera.model == CameraModel::fov;
     out.type = fov ? "fisheye1" : "fisheye4";
     out.distortion.assign(k.begin() + 4, k.begin() + (fov ? 5 : 8));
@@ -73,6 +82,7 @@ Result<Intrinsics> intrinsics_of(std::size_t c, const Camera& camera) {
   const Result<BrownLens> lens = brown_lens(camera);
   if (!lens.ok()) return refuse(lens.error().what());
   out.lens = lens.value();
+  if (!has_focals(out.lens)) return refuse(kNoFocals);
   const auto& [fx, fy, cx, cy, radial, tangential] = out.lens;
   if (out.lens.tangential()) {
     out.type = "brown";
@@ -224,6 +234,7 @@ Result<FormatOutput> format_alicevision(const Problem& given) {
           : nullptr;
   const ColmapForm form = colmap_form(problem, "alicevision");
   if (Result<void> good = check_json_names(problem); !good.ok()) return good.error();
+  if (Result<void> good = check_centres(problem); !good.ok()) return good.error();
   const std::vector<std::uint32_t> poses = pose_ids_of(source, form.image_ids);
   JsonText out;
   out.open('{');

@@ -9,6 +9,7 @@
 #include "io/brown_lens.h"
 #include "io/colmap_form.h"
 #include "io/json_text.h"
+#include "io/view_model.h"
 #include "scene/camera_frame.h"
 #include "scene/stated_rotation.h"
 
@@ -83,6 +84,7 @@ Result<FormatOutput> format_nerfstudio(const Problem& given) {
   const Problem& problem = *without_bal_cameras(given, turned);
   const ColmapForm form = colmap_form(problem, "nerfstudio");
   if (Result<void> good = check_json_names(problem); !good.ok()) return good.error();
+  if (Result<void> good = check_centres(problem); !good.ok()) return good.error();
   const bool one = problem.cameras.size() == 1;
   JsonText out;
   out.open('{');

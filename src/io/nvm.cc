@@ -12,6 +12,7 @@
 #include "io/colmap_form.h"
 #include "io/line_cursor.h"
 #include "io/point_text.h"
+#include "io/view_model.h"
 #include "scene/camera_frame.h"
 #include "scene/source_files.h"
 #include "scene/stated_rotation.h"
@@ -111,7 +112,8 @@ std::optional<Error> Reader::view() {
   if (auto e = integer(feature, "the number of a feature")) return e;
   if (auto e = reals(m, "x or y of a view")) return e;
   const double f = problem.cameras[image].parameters[0];
-  const double straight = 1 + source.nvm_distortion[image] * (m[0] * m[0] + m[1] * m[1]) / (f * f);
+  const double r = source.nvm_distortion[image];
+  const double straight = r == 0 ? 1 : 1 + r * (m[0] * m[0] + m[1] * m[1]) / (f * f);
   if (!std::isfinite(straight * m[0]) || !std::isfinite(straight * m[1]))
     return in.refuse("a measurement that its radial coefficient leaves finite");
   problem.add_observation(image, static_cast<std::uint32_t>(problem.num_points() - 1),
@@ -216,6 +218,7 @@ Result<std::string> format_nvm(const Problem& given) {
       return Error(ErrorCode::usage, "camera " + std::to_string(c) +
                                          " has no focal length above 0, which NVM asks for");
   }
+  if (Result<void> good = check_centres(problem); !good.ok()) return good.error();
   const SceneMetadata* metadata = problem.metadata.get();
   const SourceFiles* source = metadata && metadata->source && metadata->source->format == "nvm"
                                   ? metadata->source.get()

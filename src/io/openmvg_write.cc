@@ -208,6 +208,7 @@ Result<FormatOutput> format_openmvg(const Problem& given) {
           : nullptr;
   const ColmapForm form = colmap_form(problem, "openmvg");
   if (Result<void> good = check_json_names(problem); !good.ok()) return good.error();
+  if (Result<void> good = check_centres(problem); !good.ok()) return good.error();
   std::vector<Intrinsics> intrinsics;
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const Result<Intrinsics> in = intrinsics_of(c, problem.cameras[c]);

@@ -53,6 +53,12 @@ bool is_centred(const Camera& camera, const BrownLens& lens) {
          lens.cy == middle(camera.height_px);
 }
 
+/// In the unit of the file, which is the images' longer side.
+bool has_focals(const Camera& camera, const BrownLens& lens) {
+  return lens.fx / side_of(camera) > 0 && lens.fy / side_of(camera) > 0;
+}
+constexpr const char* kNoFocals = "a focal length is not above 0";
+
 Result<void> put_camera(std::size_t c, const Camera& camera, JsonText& out) {
   if (camera.width_px == 0 || camera.height_px == 0)
     return refuse(c, "its images' size is not known, which is its unit");
@@ -71,6 +77,7 @@ Result<void> put_camera(std::size_t c, const Camera& camera, JsonText& out) {
     BrownLens lens;
     lens.fx = k[0], lens.fy = opencv ? k[1] : k[0];
     lens.cx = k[opencv ? 2 : 1], lens.cy = k[opencv ? 3 : 2];
+    if (!has_focals(camera, lens)) return refuse(c, kNoFocals);
     const std::size_t first = opencv ? 4 : 3;
     if (!opencv && is_centred(camera, lens)) {
       put_lens("fisheye", camera, lens, true, {{"k1", k[3]}, {"k2", k[4]}}, out);
@@ -87,6 +94,7 @@ Result<void> put_camera(std::size_t c, const Camera& camera, JsonText& out) {
   const Result<BrownLens> lens = brown_lens(camera);
   if (!lens.ok()) return refuse(c, lens.error().what());
   const BrownLens& l = lens.value();
+  if (!has_focals(camera, l)) return refuse(c, kNoFocals);
   if (is_centred(camera, l) && l.radial_terms() < 3 && !l.tangential()) {
     put_lens("perspective", camera, l, true, {{"k1", l.k[0]}, {"k2", l.k[1]}}, out);
   } else {

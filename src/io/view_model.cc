@@ -131,4 +131,17 @@ double stated_for(double target, double guess, const std::function<double(double
   return guess;
 }
 
+Result<void> check_centres(const Problem& problem) {
+  const auto finite = [](const std::array<double, 3>& v) {
+    return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+  };
+  for (std::size_t j = 0; j < problem.num_images(); ++j) {
+    const std::array<double, 3> centre = centre_of(problem, j, nullptr);
+    if (!finite(centre) || !finite(translation_of(problem.poses[j].rotation, centre)))
+      return Error(ErrorCode::usage,
+                   "the centre of image " + std::to_string(j) + " is beyond the range of numbers");
+  }
+  return {};
+}
+
 }  // namespace sheaf

@@ -75,4 +75,8 @@ std::vector<std::uint32_t> pose_ids_of(const SourceFiles* source,
 /// it, so that what rounds on the way back does not show.
 double stated_for(double target, double guess, const std::function<double(double)>& read);
 
+/// For writers that state centres: whether those of the poses are numbers, and give numbers when
+/// they are read. Errors: usage, naming the image.
+Result<void> check_centres(const Problem& problem);
+
 }  // namespace sheaf

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "geometry/known_kinds.h"
 #include "geometry/loss.h"
 #include "options/words.h"
 #include "platform/real_text.h"
@@ -84,6 +85,7 @@ Result<Loss> parse_loss(const LossForm& form, const std::string& text) {
 }
 
 std::string text_of(const Loss& loss) {
+  if (!is_known(loss.kind)) return "loss " + std::to_string(static_cast<int>(loss.kind));
   const bool automatic = loss.scale_px == kAutomaticScale;
   const bool plain =
       loss.kind == LossKind::none && loss.scale_px >= 0 && std::isfinite(loss.scale_px);

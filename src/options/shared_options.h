@@ -28,15 +28,15 @@ struct SharedFields {
                     .range = from(0),
                     .help = "stop when the relative decrease of the cost stays below this twice"});
   }
-  static Field time_limit() {
-    return F::limit(
-        &Options::time_limit_s,
-        {.name = "time-limit",
-         .placeholder = "SECONDS",
-         .unit = "s",
-         .range = above(0),
-         .help = "stop after this long (of the command, reading included; of a library's "
-                 "call, set-up included), write the best state and exit with 7"});
+  static Field time_limit(const std::string& then = "write the best state and exit with 7") {
+    return F::limit(&Options::time_limit_s,
+                    {.name = "time-limit",
+                     .placeholder = "SECONDS",
+                     .unit = "s",
+                     .range = above(0),
+                     .help = "stop after this long (of the command, reading included; of a "
+                             "library's call, set-up included), " +
+                             then});
   }
   /// `how` says what is done about a forecast over the limit.
   static Field memory_limit(const std::string& how) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "sheaf/error.h"
 #include "sheaf/loss.h"
 #include "sheaf/problem.h"
+#include "sheaf/stop.h"
 
 namespace sheaf {
 
@@ -35,6 +37,8 @@ struct ReportOptions {
   /// What `report_precision` found while a survey's terms were in the problem, which has lost them
   /// since; null: it is found here.
   const Covariance* precision = nullptr;
+  StopToken stop{};  ///< asked while sigmas are computed, which are then left out
+  double time_limit_s = std::numeric_limits<double>::infinity();  ///< of the sigmas, likewise
 };
 
 /// How well a state is known as a report tells it, the terms of the problem counted; nothing where

@@ -284,8 +284,10 @@ std::optional<Covariance> report_precision(const Problem& result, const ReportOp
   wanted.loss = options.loss;
   wanted.threads = options.threads;
   wanted.lens_motions = result.cameras.size() <= 4;
+  wanted.stop = options.stop;
+  wanted.time_limit_s = options.time_limit_s;
   Result<Covariance> found = covariance(result, wanted);
-  if (!found.ok()) return {};
+  if (!found.ok() || found.value().ending != CovarianceEnding::whole) return {};
   return std::move(found).value();
 }
 

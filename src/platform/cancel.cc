@@ -19,4 +19,6 @@ void poll_cancelled() {
   if (asked_here != nullptr && (*asked_here)()) throw Cancelled();
 }
 
+const std::function<bool()>* cancel_question() { return asked_here; }
+
 }  // namespace sheaf

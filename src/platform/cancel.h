@@ -28,4 +28,8 @@ class CancelScope {
 /// threads are not asked; a pass of tasks ends where the one that began it throws. Costs one clock.
 void poll_cancelled();
 
+/// What `poll_cancelled` asks on this thread, for tasks on others that are long by themselves and
+/// may not throw; null outside every scope. It lives as long as the scope.
+const std::function<bool()>* cancel_question();
+
 }  // namespace sheaf

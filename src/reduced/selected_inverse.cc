@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "platform/cancel.h"
 #include "reduced/sparse_cholesky.h"
 
 namespace sheaf {
@@ -60,6 +61,7 @@ void multiply_by_inverse(const DenseKernels& kernels, const Sides& sides, Work& 
                          Threads& threads) {
   const std::size_t tasks = (work.up + kRows - 1) / kRows;
   const auto run = [&](std::size_t t) {
+    poll_cancelled();
     alignas(64) double C[kRows * kColumns];
     const std::size_t low = t * kRows, high = std::min(work.up, low + kRows);
     for (std::size_t j = 0; j < work.w; j += kColumns) {
@@ -82,6 +84,7 @@ void subtract_product(const DenseKernels& kernels, Work& work, std::size_t first
                       std::size_t target, std::size_t target_end, Threads& threads) {
   const std::size_t tasks = (end - first + kRows - 1) / kRows;
   const auto run = [&](std::size_t t) {
+    poll_cancelled();
     const std::size_t low = first + t * kRows, high = std::min(end, low + kRows);
     for (std::size_t k = 0; k < work.u; k += kDepth)
       for (std::size_t c = target; c < target_end; c += kColumns)
@@ -132,9 +135,11 @@ void SparseCholesky::invert(Threads& threads) {
       const double* column = work.column(y + j) + first;
       for (std::size_t r = 0; r < u; ++r) work.column(first + r)[j] = column[r];
     }
-    for (std::size_t b = 0; b < w; b += kColumns)  // L_JJ^-T L_JJ^-1
+    for (std::size_t b = 0; b < w; b += kColumns) {  // L_JJ^-T L_JJ^-1
+      poll_cancelled();
       kernels_.product(sides.B.data(), sides.lda, w, up, up + wp, up + b,
                        up + std::min(w, b + kColumns), work.column(b) + y, work.lda);
+    }
     subtract_product(kernels_, work, y, y + wp, 0, w, threads);  // Z_JJ
     for (std::size_t j = 0; j < w; ++j) {
       std::memcpy(panel + j * s.lda + s.top, work.column(y + j) + first, u * sizeof(double));
@@ -149,6 +154,7 @@ void SparseCholesky::invert_triangle(const Supernode& s, std::vector<double>& in
   const double* L = panels_.data() + s.panel;
   inverse.assign(w * w, 0);
   for (std::size_t j = 0; j < w; ++j) {
+    if (j % kColumns == 0) poll_cancelled();
     double* x = &inverse[j * w];
     x[j] = 1;
     for (std::size_t k = j; k < w; ++k) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "geometry/known_kinds.h"
 #include "platform/random.h"
 #include "scene/camera_frame.h"
 #include "scene/lens_scene.h"
@@ -143,6 +144,8 @@ void disturb_poses(const SceneOptions& o, Problem& start) {
 
 Result<Scene> generate(const LensSceneOptions& options) {
   const SceneOptions& o = options.scene;
+  if (!is_known(options.model))
+    return Error(ErrorCode::usage, "the camera model is none that there is");
   if (Result<void> result = check_scene(o); !result.ok()) return result.error();
   if (const Result<double> view = field_of_view_deg(options); !view.ok()) return view.error();
   const LensScene scene(options);

@@ -53,6 +53,7 @@ Result<void> check_numbers(const NoiseOptions& o) {
 
 Result<void> check(const NoiseOptions& o) {
   if (Result<void> good = check_numbers(o); !good.ok()) return good;
+  if (o.protocol > NoiseProtocol::rootba) return refusal("the protocol is none that there is");
   if (o.protocol == NoiseProtocol::ceres && o.center > 0)
     return refusal("Ceres' protocol has no noise on camera centres: its sigma is that of t");
   if (o.protocol == NoiseProtocol::rootba && o.translation > 0)

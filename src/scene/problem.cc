@@ -7,6 +7,7 @@
 #include <string>
 
 #include "geometry/camera_model.h"
+#include "geometry/known_kinds.h"
 #include "geometry/rotation.h"
 #include "scene/rigs.h"
 #include "scene/source_files.h"
@@ -70,9 +71,19 @@ Result<void> validate_sizes(const Problem& p) {
   return {};
 }
 
+Result<void> validate_models(const Problem& p) {
+  for (std::size_t i = 0; i < p.cameras.size(); ++i)
+    if (!is_known(p.cameras[i].model))
+      return invalid(numbered("camera", i) + beyond("the number of a model",
+                                                    static_cast<std::uint64_t>(p.cameras[i].model),
+                                                    kCameraModels));
+  return {};
+}
+
 /// Memory that is not there is read by nobody, whatever else is wrong.
 Result<void> check_places(const Problem& p) {
   if (Result<void> sizes = validate_sizes(p); !sizes.ok()) return sizes;
+  if (Result<void> models = validate_models(p); !models.ok()) return models;
   for (std::size_t i = 0; i < p.num_images(); ++i)
     if (p.image_camera[i] >= p.cameras.size())
       return invalid(numbered("image", i) + " names camera " + std::to_string(p.image_camera[i]) +
@@ -174,8 +185,8 @@ struct CompensatedSum {
 }  // namespace
 
 Result<void> validate(const Problem& problem) {
-  for (const auto& check : {validate_sizes, validate_images, validate_observations, validate_rigs,
-                            validate_terms, validate_metadata})
+  for (const auto& check : {validate_sizes, validate_models, validate_images, validate_observations,
+                            validate_rigs, validate_terms, validate_metadata})
     if (Result<void> result = check(problem); !result.ok()) return result;
   return {};
 }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/known_kinds.h"
 #include "platform/random.h"
 #include "scene/rig_images.h"
 #include "scene/rigs.h"
@@ -38,6 +39,8 @@ struct Track {
 Error refuse(const std::string& message) { return Error(ErrorCode::usage, message); }
 
 Result<void> check_rig_scene(const RigSceneOptions& o) {
+  if (!is_known(o.model) || o.kind > RigKind::around)
+    return refuse("the rig's kind or its camera model is none that there is");
   if (o.model == CameraModel::bal) return refuse("a rig needs a camera model other than BAL");
   const std::uint64_t sensors = sensors_of(o);
   if (sensors > 100) return refuse("a rig has at most 100 sensors");

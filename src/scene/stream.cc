@@ -48,6 +48,7 @@ Result<void> check(const FamilyOptions& o) {
     if (!(value >= 0) || !std::isfinite(value))
       return refuse(std::string("the ") + name + " must be a finite number from 0 up");
   if (o.outliers > 1) return refuse("the fraction of outliers must be at most 1");
+  if (o.family > SceneFamily::collection) return refuse("the family is none that there is");
   return {};
 }
 

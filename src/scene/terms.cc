@@ -7,6 +7,7 @@
 #include <set>
 
 #include "geometry/camera_model.h"
+#include "geometry/known_kinds.h"
 #include "geometry/loss.h"
 #include "geometry/motion_log.h"
 
@@ -19,12 +20,17 @@ bool finite(const std::vector<double>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
 }
 
+std::optional<std::string> wrong_loss(const TermLoss& loss) {
+  if (!is_known(loss.kind)) return "the loss is none that there is";
+  if (loss.kind != LossKind::none && !(loss.scale > 0)) return "the loss needs a scale above 0";
+  return {};
+}
+
 std::optional<std::string> wrong_position(const std::array<double, 3>& position,
                                           const Covariance3& covariance, const TermLoss& loss) {
   if (!finite({position.begin(), position.end()})) return "the position is not finite";
   if (!whitening(covariance)) return "the covariance is not symmetric and positive definite";
-  if (loss.kind != LossKind::none && !(loss.scale > 0)) return "the loss needs a scale above 0";
-  return {};
+  return wrong_loss(loss);
 }
 
 std::size_t columns_of(const Problem& problem, const GaussianPrior::Block& block) {
@@ -40,6 +46,7 @@ std::size_t columns_of(const Problem& problem, const GaussianPrior::Block& block
 }
 
 std::optional<std::string> wrong_block(const Problem& problem, const GaussianPrior::Block& block) {
+  if (block.kind > Kind::point) return "a block is of no kind that there is";
   const std::size_t count = block.kind == Kind::pose     ? problem.num_images()
                             : block.kind == Kind::camera ? problem.cameras.size()
                                                          : problem.num_points();
@@ -63,9 +70,7 @@ std::optional<std::string> wrong_gaussian(const Problem& problem, const Gaussian
   if (!prior.mean.empty() && prior.mean.size() != columns)
     return "mean must be empty or have " + std::to_string(columns) + " entries";
   if (!finite(prior.square_root) || !finite(prior.mean)) return "a number is not finite";
-  if (prior.loss.kind != LossKind::none && !(prior.loss.scale > 0))
-    return "the loss needs a scale above 0";
-  return {};
+  return wrong_loss(prior.loss);
 }
 
 template <class Term>
@@ -246,11 +251,6 @@ bool is_unit(const double* v, std::size_t count) {
   return std::abs(norm2 - 1) < 1e-6;
 }
 
-std::optional<std::string> wrong_loss(const TermLoss& loss) {
-  if (loss.kind != LossKind::none && !(loss.scale > 0)) return "the loss needs a scale above 0";
-  return {};
-}
-
 std::optional<std::string> wrong_term(const Problem& problem, const RotationPrior& of) {
   if (of.image >= problem.num_images()) return "it names an image that there is not";
   if (!is_unit(of.rotation.data(), 4)) return "the rotation is not a unit quaternion";
@@ -354,8 +354,8 @@ std::optional<std::string> wrong_terms(const Problem& problem) {
     else if (!(of.sigma > 0) || !std::isfinite(of.sigma) || !(of.distance >= 0) ||
              !std::isfinite(of.distance))
       wrong = "the distance must be finite and at least 0, its sigma finite and above 0";
-    else if (of.loss.kind != LossKind::none && !(of.loss.scale > 0))
-      wrong = "the loss needs a scale above 0";
+    else
+      wrong = wrong_loss(of.loss);
     if (wrong) return at("distance", terms.distances, of, *wrong);
   }
   for (const GaussianPrior& of : terms.gaussians)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "geometry/known_kinds.h"
 #include "scene/rigs.h"
 #include "sheaf/solver.h"
 #include "solve/leaving_rows.h"
@@ -153,6 +154,8 @@ Result<GaussianPrior> marginalise(const Problem& problem, const std::vector<std:
     return Error(ErrorCode::usage,
                  "images of rigs cannot be marginalised: a Gaussian has poses of "
                  "images, not of frames and sensors");
+  if (!is_known(options.loss.kind))
+    return Error(ErrorCode::usage, "to marginalise: the loss is none that there is");
   if (options.loss.kind != LossKind::none && !(options.loss.scale_px > 0))
     return Error(ErrorCode::usage,
                  "to marginalise, the loss needs a scale above 0: the last one of "

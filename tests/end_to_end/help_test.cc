@@ -103,7 +103,7 @@ std::set<std::string> options_of(const std::string& verb) {
   if (verb == "covariance")
     options.insert({"--gauge", "--sigma", "--loss", "--conditional", "--observations", "--points",
                     "--memory-limit", "--csv", "--fix", "--refine", "--rigs", "--constraints",
-                    "--poses", "--pairs", "--solver"});
+                    "--poses", "--pairs", "--solver", "--time-limit"});
   if (verb == "covariance" || verb == "calibrate")
     options.insert({"--projection", "--projection-figure", "--distance", "--grid"});
   if (verb == "calibrate")

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <thread>
@@ -214,6 +215,68 @@ TEST_F(InterruptedSolve, TimeLimitWritesTheBestStateAndExitsWithSeven) {
   EXPECT_EQ(outcome.exit_code, 7) << outcome.out << outcome.err;
   EXPECT_EQ(json("o.json")["termination"]["code"], "time_limit");
   EXPECT_GT(json("o.json")["time"]["total_s"].get<double>(), 4.9);
+}
+
+/// Whose images are nearly all coupled, so that sigmas take some seconds, and one step less.
+class InterruptedSigmas : public SolveVerb {
+ protected:
+  void SetUp() override {
+    generate({"--cameras", "400", "--points", "6000", "--mean-track", "160"});
+  }
+  static double seconds_since(std::chrono::steady_clock::time_point then) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
+  }
+  /// All but sigmas is there, and their want is said.
+  void expect_the_rest(const Outcome& outcome, int exit_code) {
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.out << outcome.err;
+    EXPECT_EQ(folder_.names(), (Words{"in.txt", "o.json", "o.txt"}));
+    EXPECT_EQ(json("o.json")["sigmas"], "cut short");
+    EXPECT_NE(outcome.out.find("no sigmas: the run was cut short"), std::string::npos);
+    const double cost = json("o.json")["final_cost"];
+    EXPECT_NEAR(evaluate(problem("o.txt")).cost, cost, 1e-9 * cost);
+  }
+  const Words asked_ = {"solve",  "in.txt",           "-o", "o.txt", "--json", "o.json", "--sigmas",
+                        "s.json", "--max-iterations", "1"};
+};
+
+TEST_F(InterruptedSigmas, ASignalLeavesTheSolvedModel) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    RunningCommand command(asked_, folder_.path());
+    ASSERT_TRUE(command.wait_for_stderr("change -")) << "no step was accepted";
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    const auto sent = std::chrono::steady_clock::now();
+    command.send(signal);
+    const Outcome outcome = command.wait();
+    if (outcome.exit_code == 0) GTEST_SKIP() << "done before the signal";
+    EXPECT_LT(seconds_since(sent), 2);  // one, and what the model takes to be written
+    expect_the_rest(outcome, 130);
+  }
+}
+
+TEST_F(InterruptedSigmas, ATimeLimitLeavesTheSolvedModel) {
+  ASSERT_EQ(run({"solve", "in.txt", "--max-iterations", "1", "--json", "t.json"}).exit_code, 0);
+  const double alone_s = json("t.json")["time"]["total_s"];
+  std::filesystem::remove(folder_ / "t.json");
+  Words arguments = asked_;
+  arguments.insert(arguments.end(), {"--time-limit", std::to_string(alone_s + 0.5)});
+  const Outcome outcome = run(arguments);
+  if (outcome.exit_code == 0) GTEST_SKIP() << "done within the limit";
+  EXPECT_LT(json("o.json")["time"]["total_s"].get<double>(), alone_s + 2.5);
+  expect_the_rest(outcome, 7);
+}
+
+TEST_F(InterruptedSigmas, TheVerbCovarianceWritesNothing) {
+  RunningCommand command({"covariance", "in.txt", "--json", "s.json", "--csv", "s.csv"},
+                         folder_.path());
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  const auto sent = std::chrono::steady_clock::now();
+  command.send(SIGTERM);
+  EXPECT_EQ(command.wait().exit_code, 130);
+  EXPECT_LT(seconds_since(sent), 1);
+  const Outcome late = run({"covariance", "in.txt", "--json", "s.json", "--time-limit", "0.4"});
+  EXPECT_EQ(late.exit_code, 7) << late.out << late.err;
+  EXPECT_NE(late.err.find("nothing is written"), std::string::npos);
+  EXPECT_EQ(folder_.names(), Words{"in.txt"});
 }
 
 TEST_F(SolveVerb, CtrlCWhileReadingEndsAtOnceAndWritesNothing) {
