@@ -18,6 +18,7 @@
 #include "systems/choose_points.h"
 #include "systems/choose_solver.h"
 #include "systems/home.h"
+#include "systems/point_piece.h"
 #include "systems/term.h"
 
 namespace sheaf {
@@ -40,6 +41,20 @@ class Build {
   bool lends() const { return lends_; }
   /// Frees the problem's observations until `lent` goes, which must outlive neither of them.
   void lend(Problem& problem, std::optional<LentObservations>& lent) const;
+
+  /// What a home of these points is made of, for one that brings its own camera stage: what Build
+  /// holds is referred to. Not where images are solved by themselves. Throws std::bad_alloc.
+  struct Parts {
+    std::unique_ptr<PointRows> rows;
+    CameraState cameras;
+    CameraColumns camera_columns;
+    PointRules rules;
+    const Columns* columns;  ///< of what is solved for
+  };
+  Parts make_parts(const Problem& problem, const CameraState* held = nullptr);
+  bool images_alone() const { return by_image_.has_value(); }
+  /// Where the lenses' own blocks stand; null where each image has its lens in its block.
+  const LensTracks* tracks() const { return view_ ? nullptr : &arranged_->tracks; }
 
   /// The home, which the Build must outlive; its cameras are the problem's, or `held` as another
   /// home had them. Throws std::bad_alloc.
