@@ -83,8 +83,10 @@ std::optional<Error> Reader::image(std::uint64_t i) {
   std::string_view name;
   if (auto e = image_name(of, name)) return e;
   if (name.find_first_of(std::string_view("\t\r\0", 3)) != name.npos)
-    return in.refuse_as("found a tab, a zero byte or half a line's end inside the name, expected "
-                        "the name" + of);
+    return in.refuse_as(
+        "found a tab, a zero byte or half a line's end inside the name, expected "
+        "the name" +
+        of);
   if (name.starts_with('#')) return in.refuse_as("found a comment, expected the name" + of);
   metadata.image_names.emplace_back(name);
   std::array<double, 1> f{}, r{}, zero{};

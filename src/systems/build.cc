@@ -116,13 +116,13 @@ Build::Build(const SolveOptions& options, const Kernels& kernels, Threads& threa
 
 Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
-                          Threads& threads) {
+                          Threads& threads, bool lens_blocks) {
   Build build(options, kernels, threads);
   build.points_ = choose_points(problem, skip, options);
   build.options_.points = build.points_.points;
   build.skips_ = !skip.empty();
   build.kept_ = kept_points(problem.terms);
-  if (BalView::serves(problem, options.fixed) && !restates_terms(problem))
+  if (!lens_blocks && BalView::serves(problem, options.fixed) && !restates_terms(problem))
     build.view_.emplace(problem, options.fixed);
   const Result<void> done =
       build.view_ ? build.plan_bal(problem, skip) : build.plan_lenses(problem, skip);
@@ -235,10 +235,9 @@ std::unique_ptr<Home> Build::make_home(const Problem& problem, const CameraState
       start = *held;
     else
       cameras(problem, start);
-    return std::make_unique<ImageSystem>(std::move(start), problem.image_camera,
-                                         std::move(*by_image_), arranged_->columns,
-                                         watches_behind(), image_kernels(kernels_->name),
-                                         *threads_);
+    return std::make_unique<ImageSystem>(
+        std::move(start), problem.image_camera, std::move(*by_image_), arranged_->columns,
+        watches_behind(), image_kernels(kernels_->name), *threads_);
   }
   Parts parts = make_parts(problem, held);
   return std::make_unique<PointSystem>(
@@ -283,11 +282,15 @@ Build::Parts Build::make_parts(const Problem& problem, const CameraState* held) 
   return out;
 }
 
-void Build::store(const Home& home, Problem& problem) const {
+void Build::store(const CameraState& cameras, Problem& problem) const {
   if (view_)
-    view_->store(home.cameras(), problem);
+    view_->store(cameras, problem);
   else
-    sheaf::store(home.cameras(), problem);
+    sheaf::store(cameras, problem);
+}
+
+void Build::store(const Home& home, Problem& problem) const {
+  store(home.cameras(), problem);
   home.store_points(problem.points);
   for (std::size_t j = 0; j < kept_.size(); ++j)
     std::copy(home.cameras().kept[j].begin(), home.cameras().kept[j].end(),

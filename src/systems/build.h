@@ -29,11 +29,11 @@ namespace sheaf {
 class Build {
  public:
   /// Arranges the problem and chooses the solver; nothing of that is allocated yet. skip: 1 for
-  /// each observation to leave out, or empty. Errors: usage, what cannot be solved so;
-  /// memory_limit.
+  /// each observation to leave out, or empty. lens_blocks: lenses that images share have blocks of
+  /// their own, whatever their model. Errors: usage, what cannot be solved so; memory_limit.
   static Result<Build> plan(const Problem& problem, const SolveOptions& options,
                             const std::vector<std::uint8_t>& skip, const Kernels& kernels,
-                            Threads& threads);
+                            Threads& threads, bool lens_blocks = false);
 
   const Choice& choice() const { return choice_; }
   const PointChoice& points() const { return points_; }
@@ -61,6 +61,8 @@ class Build {
   std::unique_ptr<Home> make_home(const Problem& problem, const CameraState* held = nullptr);
   /// Whether these are cameras of a home of this problem.
   bool fits(const CameraState& held, const Problem& problem) const;
+  /// Writes the state of cameras into the problem.
+  void store(const CameraState& cameras, Problem& problem) const;
   /// Writes the home's held state into the problem.
   void store(const Home& home, Problem& problem) const;
 
