@@ -136,8 +136,9 @@ int run(const JoinArguments& a) {
   if (a.common.json.empty()) return 0;
   write_json({{"version", SHEAF_VERSION},
               {"pieces", count},
-              {"initial", {{"cost", before.cost}, {"rms_px", before.rms_px}}},
-              {"final", {{"cost", after.cost}, {"rms_px", after.rms_px}}},
+              {"initial_cost", before.cost},
+              {"final_cost", after.cost},
+              {"rms_px", {{"before", before.rms_px}, {"after", after.rms_px}}},
               {"time", {{"read_s", input.read_s}, {"total_s", total.seconds()}}}},
              a.common.json);
   return 0;
