@@ -11,7 +11,8 @@ namespace sheaf {
 std::vector<Verb> all_verbs() {
   return {solve_verb(),       info_verb(),   check_verb(),      convert_verb(),   perturb_verb(),
           evaluate_verb(),    align_verb(),  covariance_verb(), calibrate_verb(), compare_verb(),
-          photometric_verb(), report_verb(), view_verb(),       generate_verb(),  demo_verb()};
+          photometric_verb(), report_verb(), view_verb(),       generate_verb(),  demo_verb(),
+          split_verb(),       join_verb()};
 }
 
 std::vector<BoundOption> options_of(CommonOptions& options) {

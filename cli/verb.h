@@ -34,6 +34,8 @@ Verb compare_verb();
 Verb photometric_verb();
 Verb generate_verb();
 Verb demo_verb();
+Verb split_verb();
+Verb join_verb();
 Verb report_verb();
 Verb view_verb();
 /// All of them, in the order of the command's help.

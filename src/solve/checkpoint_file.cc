@@ -68,21 +68,22 @@ Result<void> write_checkpoint_file(const CheckpointKind& kind, std::string_view 
 Result<std::string> read_checkpoint_file(const CheckpointKind& kind, const std::string& path) {
   const Result<std::string> text = read_text(path);
   if (!text.ok()) return text.error();
+  const std::string noun(kind.noun);
   std::string_view bytes = text.value();
   if (!bytes.starts_with(kind.mark))
-    return no_checkpoint(path, "found no checkpoint of a " + std::string(kind.of));
+    return no_checkpoint(path, "found no " + noun + " of a " + std::string(kind.of));
   bytes.remove_prefix(kind.mark.size());
-  if (bytes.size() < kDigest) return no_checkpoint(path, "the checkpoint is cut off");
+  if (bytes.size() < kDigest) return no_checkpoint(path, "the " + noun + " is cut off");
   const std::string_view digest = bytes.substr(bytes.size() - kDigest);
   bytes.remove_suffix(kDigest);
   if (digest != digest_of(bytes))
-    return no_checkpoint(path, "the checkpoint is damaged: its checksum is another");
+    return no_checkpoint(path, "the " + noun + " is damaged: its checksum is another");
   std::uint32_t version = 0;
-  if (bytes.size() < sizeof version) return no_checkpoint(path, "the checkpoint is cut off");
+  if (bytes.size() < sizeof version) return no_checkpoint(path, "the " + noun + " is cut off");
   ArchiveReader a(bytes.substr(0, sizeof version));
   a(version);
   if (version != kind.version)
-    return no_checkpoint(path, "found a checkpoint of version " + std::to_string(version) +
+    return no_checkpoint(path, "found a " + noun + " of version " + std::to_string(version) +
                                    ", expected " + std::to_string(kind.version));
   return std::string(bytes.substr(sizeof version));
 }

@@ -49,6 +49,7 @@ struct CheckpointKind {
   std::string_view mark;
   std::string_view of;    ///< as in "found no checkpoint of a solve"
   std::uint32_t version;  ///< grows with what is written
+  std::string_view noun = "checkpoint";
 };
 
 /// Written beside and renamed. Errors: unwritable_output.

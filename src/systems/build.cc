@@ -116,13 +116,13 @@ Build::Build(const SolveOptions& options, const Kernels& kernels, Threads& threa
 
 Result<Build> Build::plan(const Problem& problem, const SolveOptions& options,
                           const std::vector<std::uint8_t>& skip, const Kernels& kernels,
-                          Threads& threads) {
+                          Threads& threads, bool lens_blocks) {
   Build build(options, kernels, threads);
   build.points_ = choose_points(problem, skip, options);
   build.options_.points = build.points_.points;
   build.skips_ = !skip.empty();
   build.kept_ = kept_points(problem.terms);
-  if (BalView::serves(problem, options.fixed) && !restates_terms(problem))
+  if (!lens_blocks && BalView::serves(problem, options.fixed) && !restates_terms(problem))
     build.view_.emplace(problem, options.fixed);
   const Result<void> done =
       build.view_ ? build.plan_bal(problem, skip) : build.plan_lenses(problem, skip);
@@ -229,52 +229,68 @@ bool Build::fits(const CameraState& held, const Problem& problem) const {
 }
 
 std::unique_ptr<Home> Build::make_home(const Problem& problem, const CameraState* held) {
+  if (by_image_) {
+    CameraState start;
+    if (held != nullptr)
+      start = *held;
+    else
+      cameras(problem, start);
+    return std::make_unique<ImageSystem>(
+        std::move(start), problem.image_camera, std::move(*by_image_), arranged_->columns,
+        watches_behind(), image_kernels(kernels_->name), *threads_);
+  }
+  Parts parts = make_parts(problem, held);
+  return std::make_unique<PointSystem>(
+      std::move(parts.rows),
+      PointSystem::Start{std::move(parts.cameras), std::move(parts.camera_columns),
+                         &problem.points},
+      PointSystem::Numbering{parts.columns, &arranged_->solved_coarse_columns()}, parts.rules,
+      choice_.plan, *kernels_, *threads_);
+}
+
+Build::Parts Build::make_parts(const Problem& problem, const CameraState* held) {
   const Kernels& kernels = *kernels_;
-  CameraState start;
+  Parts out;
   if (held != nullptr)
-    start = *held;
+    out.cameras = *held;
   else
-    cameras(problem, start);
-  if (by_image_)
-    return std::make_unique<ImageSystem>(std::move(start), problem.image_camera,
-                                         std::move(*by_image_), arranged_->columns,
-                                         watches_behind(), image_kernels(kernels.name), *threads_);
-  const PointRules rules{options_.fixed.points, watches_behind(), options_.inner_iterations,
-                         chart_base(options_.points), points_.crosses};
-  if (view_) cut_bal_lists(choice_.plan.kind, rules.held, *threads_, *arranged_);
+    cameras(problem, out.cameras);
+  out.rules = {options_.fixed.points, watches_behind(), options_.inner_iterations,
+               chart_base(options_.points), points_.crosses};
+  if (view_) cut_bal_lists(choice_.plan.kind, out.rules.held, *threads_, *arranged_);
   poll_cancelled();
   const Columns& columns = arranged_->columns;
-  CameraColumns camera_columns = view_ ? CameraColumns::of_bal(columns, problem.image_camera)
-                                       : CameraColumns::of_lenses(columns, arranged_->tracks);
-  camera_columns.keep_within(problem.terms.bounds);
-  std::unique_ptr<PointRows> rows;
+  out.camera_columns = view_ ? CameraColumns::of_bal(columns, problem.image_camera)
+                             : CameraColumns::of_lenses(columns, arranged_->tracks);
+  out.camera_columns.keep_within(problem.terms.bounds);
   if (view_)
-    rows = std::make_unique<BalRows>(*arranged_, problem.image_camera, kernels, *threads_);
+    out.rows = std::make_unique<BalRows>(*arranged_, problem.image_camera, kernels, *threads_);
   else
-    rows = std::make_unique<LensRows>(*arranged_, kernels, *threads_);
+    out.rows = std::make_unique<LensRows>(*arranged_, kernels, *threads_);
   if (arranged_->map) {
     const SolverKind kind = choice_.plan.kind;
     const bool forms = kind != SolverKind::implicit_cg && kind != SolverKind::blocks;
     const std::size_t kept = kept_.size(), first_kept = columns.num_images();
     if (!terms_.empty())
-      rows = std::make_unique<TermRows>(std::move(rows), std::move(terms_), columns, kept);
-    rows = std::make_unique<MappedRows>(std::move(rows), arranged_->row_columns, *arranged_->map,
-                                        forms, kernels.name, *threads_);
-    camera_columns.add_kept(arranged_->row_columns, first_kept, kept);
-    camera_columns = camera_columns.through(*arranged_->map, problem.rigs);
+      out.rows = std::make_unique<TermRows>(std::move(out.rows), std::move(terms_), columns, kept);
+    out.rows = std::make_unique<MappedRows>(std::move(out.rows), arranged_->row_columns,
+                                            *arranged_->map, forms, kernels.name, *threads_);
+    out.camera_columns.add_kept(arranged_->row_columns, first_kept, kept);
+    out.camera_columns = out.camera_columns.through(*arranged_->map, problem.rigs);
   }
-  return std::make_unique<PointSystem>(
-      std::move(rows),
-      PointSystem::Start{std::move(start), std::move(camera_columns), &problem.points},
-      PointSystem::Numbering{&arranged_->solved_columns(), &arranged_->solved_coarse_columns()},
-      rules, choice_.plan, kernels, *threads_);
+  out.columns = &arranged_->solved_columns();
+  return out;
+}
+
+void Build::store(const CameraState& cameras, Problem& problem) const {
+  if (view_)
+    view_->store(cameras, problem);
+  else
+    sheaf::store(cameras, problem);
 }
 
 void Build::store(const Home& home, Problem& problem) const {
-  if (view_)
-    view_->store(home.cameras(), problem);
-  else
-    sheaf::store(home.cameras(), problem);
+  store(home.cameras(), problem);
   home.store_points(problem.points);
   for (std::size_t j = 0; j < kept_.size(); ++j)
     std::copy(home.cameras().kept[j].begin(), home.cameras().kept[j].end(),

@@ -18,6 +18,7 @@
 #include "systems/choose_points.h"
 #include "systems/choose_solver.h"
 #include "systems/home.h"
+#include "systems/point_piece.h"
 #include "systems/term.h"
 
 namespace sheaf {
@@ -28,11 +29,11 @@ namespace sheaf {
 class Build {
  public:
   /// Arranges the problem and chooses the solver; nothing of that is allocated yet. skip: 1 for
-  /// each observation to leave out, or empty. Errors: usage, what cannot be solved so;
-  /// memory_limit.
+  /// each observation to leave out, or empty. lens_blocks: lenses that images share have blocks of
+  /// their own, whatever their model. Errors: usage, what cannot be solved so; memory_limit.
   static Result<Build> plan(const Problem& problem, const SolveOptions& options,
                             const std::vector<std::uint8_t>& skip, const Kernels& kernels,
-                            Threads& threads);
+                            Threads& threads, bool lens_blocks = false);
 
   const Choice& choice() const { return choice_; }
   const PointChoice& points() const { return points_; }
@@ -41,11 +42,27 @@ class Build {
   /// Frees the problem's observations until `lent` goes, which must outlive neither of them.
   void lend(Problem& problem, std::optional<LentObservations>& lent) const;
 
+  /// What a home of these points is made of, for one that brings its own camera stage: what Build
+  /// holds is referred to. Not where images are solved by themselves. Throws std::bad_alloc.
+  struct Parts {
+    std::unique_ptr<PointRows> rows;
+    CameraState cameras;
+    CameraColumns camera_columns;
+    PointRules rules;
+    const Columns* columns;  ///< of what is solved for
+  };
+  Parts make_parts(const Problem& problem, const CameraState* held = nullptr);
+  bool images_alone() const { return by_image_.has_value(); }
+  /// Where the lenses' own blocks stand; null where each image has its lens in its block.
+  const LensTracks* tracks() const { return view_ ? nullptr : &arranged_->tracks; }
+
   /// The home, which the Build must outlive; its cameras are the problem's, or `held` as another
   /// home had them. Throws std::bad_alloc.
   std::unique_ptr<Home> make_home(const Problem& problem, const CameraState* held = nullptr);
   /// Whether these are cameras of a home of this problem.
   bool fits(const CameraState& held, const Problem& problem) const;
+  /// Writes the state of cameras into the problem.
+  void store(const CameraState& cameras, Problem& problem) const;
   /// Writes the home's held state into the problem.
   void store(const Home& home, Problem& problem) const;
 

@@ -60,6 +60,7 @@ class CameraColumns {
     double upper = std::numeric_limits<double>::infinity();
   };
 
+  CameraColumns() = default;  ///< of nothing
   /// BAL lenses: f, k1, k2 are the first three parameters of an image's lens.
   static CameraColumns of_bal(const Columns& columns,
                               const std::vector<std::uint32_t>& image_camera);

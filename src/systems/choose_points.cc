@@ -18,7 +18,7 @@ namespace {
 
 /// At least so many of many points.
 constexpr std::size_t kLookedAt = 1024;
-constexpr double kSmallParallax_px = 20, kEnough = 0.02;
+constexpr double kEnough = 0.02;
 /// Where the camera all but rotates alone no depth is known, and there is no side to keep to.
 constexpr double kMostly = 0.5;
 
@@ -89,16 +89,21 @@ void choose(PointParametrisation points, bool crosses, const char* reason, Point
 
 }  // namespace
 
-void choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
-                   const SolveOptions& options, ParallaxScratch& scratch, PointChoice& out) {
+bool asks_for_parallax(const SolveOptions& options, PointChoice& out) {
   const bool crosses = options.cheirality == Cheirality::formula;
   if (options.points != PointParametrisation::automatic)
-    return choose(options.points, crosses, "as asked", out);
-  if (options.fixed.points)
-    return choose(PointParametrisation::xyz, crosses, "points are held", out);
-  if (options.trust_region == TrustRegion::dogleg)
-    return choose(PointParametrisation::xyz, crosses, "the dogleg knows no other", out);
-  const double share = share_of_small_parallax(problem, skip, kSmallParallax_px, scratch);
+    choose(options.points, crosses, "as asked", out);
+  else if (options.fixed.points)
+    choose(PointParametrisation::xyz, crosses, "points are held", out);
+  else if (options.trust_region == TrustRegion::dogleg)
+    choose(PointParametrisation::xyz, crosses, "the dogleg knows no other", out);
+  else
+    return true;
+  return false;
+}
+
+void choose_by_parallax(double share, const SolveOptions& options, PointChoice& out) {
+  const bool crosses = options.cheirality == Cheirality::formula;
   std::array<char, 96> text{};
   std::snprintf(text.data(), text.size(), "%.2g %% of the points have a parallax below %.0f px",
                 100 * share, kSmallParallax_px);
@@ -106,6 +111,13 @@ void choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip
     return choose(PointParametrisation::xyz, crosses, "a loss is quicker with them", out);
   if (share < kEnough) return choose(PointParametrisation::xyz, crosses, text.data(), out);
   choose(PointParametrisation::inverse_depth, crosses && share >= kMostly, text.data(), out);
+}
+
+void choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
+                   const SolveOptions& options, ParallaxScratch& scratch, PointChoice& out) {
+  if (asks_for_parallax(options, out))
+    choose_by_parallax(share_of_small_parallax(problem, skip, kSmallParallax_px, scratch), options,
+                       out);
 }
 
 PointChoice choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip,

@@ -44,6 +44,14 @@ PointChoice choose_points(const Problem& problem, const std::vector<std::uint8_t
 void choose_points(const Problem& problem, const std::vector<std::uint8_t>& skip,
                    const SolveOptions& options, ParallaxScratch& scratch, PointChoice& out);
 
+// The two halves of the choice, for those who have the share of all points from several places.
+
+/// Whether the options leave the choice to the share; else `out` is it.
+bool asks_for_parallax(const SolveOptions& options, PointChoice& out);
+/// The choice for this share of points with a parallax below kSmallParallax_px.
+void choose_by_parallax(double share, const SolveOptions& options, PointChoice& out);
+constexpr double kSmallParallax_px = 20;
+
 /// Of the points that at least two images see, the part that is seen under a parallax of less than
 /// `parallax_px`: the largest angle between the ray of a point's first observation and another
 /// one, times that image's focal length. Of many points some, evenly spread, are looked at.

@@ -37,8 +37,8 @@ Trial PointSystem::trial() {
 
 DoglegPasses& PointSystem::passes() {
   if (passes_ == nullptr)
-    passes_ = std::make_unique<DoglegPasses>(rows_->make_dogleg(), columns_, rows_->chunks(),
-                                             rows_->num_blocks(), rules_.held, threads_);
+    passes_ = std::make_unique<DoglegPasses>(rows().make_dogleg(), columns_, rows().chunks(),
+                                             rows().num_blocks(), piece_.rules().held, threads_);
   return *passes_;
 }
 

@@ -13,24 +13,12 @@
 #include "systems/dogleg_passes.h"
 #include "systems/home.h"
 #include "systems/plan.h"
-#include "systems/point_rows.h"
+#include "systems/point_piece.h"
 
 namespace sheaf {
 
-/// What happens to the points in a step.
-struct PointRules {
-  bool held = false;
-  /// Count in each trial the observations that newly go behind their camera.
-  bool watch_behind = false;
-  int inner_iterations = 0;            ///< of each point by itself, once the cameras have stepped
-  ChartBase charts = ChartBase::none;  ///< what their local coordinates are about
-  bool crosses = true;                 ///< whether a step may take them through infinity
-};
-
-/// The home of all rows whose points are eliminated, on CPU threads: the point pass over chunks,
-/// the camera stage, the trial and the dogleg, whatever the rows are. The order of every sum is
-/// fixed by the problem: chunks within a slice in order, slices in order; so the bytes do not
-/// depend on the number of threads.
+/// The home of all rows whose points are eliminated, on CPU threads: one piece that has all points,
+/// the camera stage, the trial and the dogleg, whatever the rows are.
 class PointSystem : public Home {
  public:
   /// A problem's cameras and points as they start, and which columns step the cameras.
@@ -56,23 +44,18 @@ class PointSystem : public Home {
   HomeHistory history() const override;
   bool restore(const HomeHistory& history) override;
   bool restart(const CameraState& cameras, const std::vector<double>& points) override;
-  double pixel_rms() override { return rows_->pixel_rms(); }
-  const CameraState& cameras() const override { return state_.held.cameras; }
-  void store_points(std::vector<double>& points) const override;
-  std::uint64_t count_behind() override { return rows_->count_behind(); }
+  double pixel_rms() override { return rows().pixel_rms(); }
+  const CameraState& cameras() const override { return piece_.state().held.cameras; }
+  void store_points(std::vector<double>& points) const override { piece_.store_points(points); }
+  std::uint64_t count_behind() override { return rows().count_behind(); }
   std::uint64_t bytes() const override;
   /// How often the camera system was solved so far.
   std::uint64_t camera_solves() const { return stage_.solves(); }
 
  private:
   void set_solver(const Plan& plan, const Numbering& columns, const Kernels& kernels);
-  void fill_points(const std::vector<double>& points);
-  void place_charts();
-  void allocate_for_loss();
-  void allocate_scratch();
   Step linearize(const StepRequest& request);
-  void eliminate(const StepRequest& request);
-  Step collect_step(const StepRequest& request);
+  Step collect_step(const StepRequest& request, const PointPiece::Eliminated& eliminated);
   bool only_radius_is_new(const StepRequest& request) const;
   Trial try_step(const DoglegStep& step);
   double less_what_was_left(double predicted) const;
@@ -81,24 +64,16 @@ class PointSystem : public Home {
   DoglegPasses& passes();
   void measure_newton();
   void measure_descent();
-  std::size_t num_slices() const { return rows_->chunks().slices.size() - 1; }
+  PointRows& rows() { return piece_.rows(); }
 
-  const std::unique_ptr<PointRows> rows_;
+  PointPiece piece_;
   const Columns& columns_;
   const CameraColumns camera_columns_;
-  const PointRules rules_;
   const bool float_products_;  ///< until StepRequest::precise
   const bool float_blocks_;    ///< likewise, and then they are no more
   const Reduction& reduction_ = local_reduction();
   Threads& threads_;
-  SteppedState state_;
-  ChartRules chart_;                         ///< of the points' steps
-  Buffer<double> tiles_, diagonal_;          ///< one set per slice, the first ends up as the sum
-  std::vector<Buffer<double>> scratch_;      ///< one per thread
-  std::vector<EliminateOutput> eliminated_;  ///< one per slice
-  std::vector<TrialOutput> trials_;          ///< one per slice
   CameraStage stage_;
-  ReducedSums sums_{};  ///< of the last elimination
   double mean_square_ = 0, point_decrease_ = 0, trial_cost_ = 0;
   double left_decrease_ = 0;  ///< twice what points promised that did not follow the trial's step
   ScaledLoss loss_;           ///< of the last proposal
