@@ -182,12 +182,15 @@ Verb join_verb() {
                                         .placeholder = "FOLDER",
                                         .help = "folder of the pieces, of this very scene"})},
       *a);
-  verb.options = joined({bound<JoinArguments>({F::text(&JoinArguments::out, {.name = "out",
-                                                                             .placeholder = "FILE",
-                                                                             .help = kProblemOut,
-                                                                             .short_name = "o"})},
-                                              *a),
-                         options_of(a->common)});
+  verb.options =
+      joined({bound<JoinArguments>(
+                  {F::text(&JoinArguments::out,
+                           {.name = "output",
+                            .placeholder = "OUT",
+                            .help = std::string("write the refined problem; ") + kProblemOut,
+                            .short_name = "o"})},
+                  *a),
+              options_of(a->common)});
   verb.run = [a] { return run(*a); };
   return verb;
 }

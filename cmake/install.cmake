@@ -23,7 +23,7 @@ install(FILES ${PROJECT_BINARY_DIR}/sheafConfig.cmake
 list(TRANSFORM GEOGRAPHICLIB_LIBRARIES PREPEND -l OUTPUT_VARIABLE SHEAF_GEOGRAPHICLIB)
 list(JOIN SHEAF_GEOGRAPHICLIB " " SHEAF_GEOGRAPHICLIB)
 # A static library hands its own dependencies on to whoever links it; a shared one keeps them.
-set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb ${SHEAF_GEOGRAPHICLIB} -lexif -lutf8proc -lsqlite3 -lpng -ljpeg -lz -lbz2 -pthread")
+set(SHEAF_PC_DEPENDENCIES "-lhwy -ltbb ${SHEAF_GEOGRAPHICLIB} -lexif -lutf8proc -lmetis -lsqlite3 -lpng -ljpeg -lz -lbz2 -pthread")
 if(BUILD_SHARED_LIBS)
   set(SHEAF_PC_LIBS "")
 else()

@@ -31,7 +31,7 @@ command -v aarch64-linux-gnu-g++ >/dev/null || command -v aarch64-linux-gnu-g++-
 packages=(libtbb-dev libtbb12 libtbbmalloc2 libtbbbind-2-5 libhwy-dev libhwy1 libfast-float-dev
           libeigen3-dev zlib1g-dev zlib1g libbz2-dev libbz2-1.0 libpng-dev libpng16-16 libjpeg-dev
           libjpeg62-turbo-dev libjpeg62-turbo libgeographiclib-dev libgeographiclib23 libsqlite3-dev
-          libsqlite3-0 libexif-dev libexif12 libutf8proc-dev
+          libsqlite3-0 libexif-dev libexif12 libutf8proc-dev libmetis-dev libmetis5
           libutf8proc2 libcli11-dev libfmt-dev libfmt9 nlohmann-json3-dev)
 unpack() {
   mkdir -p "$root"/apt/{lists,cache/archives}/partial "$root/packages"

@@ -14,7 +14,7 @@ set -euo pipefail
 
 wanted=(cmake ninja-build g++ make pkg-config libtbb-dev libhwy-dev libfast-float-dev
         libeigen3-dev zlib1g-dev libbz2-dev libpng-dev libjpeg-dev libgeographiclib-dev
-        libsqlite3-dev libexif-dev libutf8proc-dev libcli11-dev libfmt-dev nlohmann-json3-dev
+        libsqlite3-dev libexif-dev libutf8proc-dev libmetis-dev libcli11-dev libfmt-dev nlohmann-json3-dev
         libgtest-dev libbenchmark-dev python3 python3-numpy python3-dev python3-venv python3-pip)
 
 is_installed() { dpkg-query -W -f '${db:Status-Status}\n' "$1" 2>/dev/null | grep -qx installed; }

@@ -93,6 +93,8 @@ std::set<std::string> options_of(const std::string& verb) {
                     "--report",
                     "--rows"});
   if (verb == "demo") options.insert("--ply");
+  if (verb == "split") options.insert("--pieces");
+  if (verb == "join") options.insert("--output");
   if (verb == "compare")
     options.insert({"--solvers", "--peers", "--reference", "--max-iterations", "--time-limit",
                     "--time-to", "--runs", "--plot", "--fix", "--refine", "--own-lenses", "--steps",
@@ -201,16 +203,16 @@ TEST_P(Help, ExampleRuns) {
 INSTANTIATE_TEST_SUITE_P(Verbs, Help,
                          testing::Values("solve", "info", "check", "convert", "perturb", "evaluate",
                                          "align", "covariance", "calibrate", "photometric",
-                                         "report", "generate", "demo"),
+                                         "report", "generate", "demo", "split"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Command, HelpNamesTheVerbsAndVersionTheVersion) {
   TemporaryFolder folder;
   const Outcome help = run_command({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* verb :
-       {"solve", "info", "check", "convert", "perturb", "evaluate", "align", "covariance",
-        "calibrate", "compare", "photometric", "report", "view", "generate", "demo"})
+  for (const char* verb : {"solve", "info", "check", "convert", "perturb", "evaluate", "align",
+                           "covariance", "calibrate", "compare", "photometric", "report", "view",
+                           "generate", "demo", "split", "join"})
     EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
   const Outcome version = run_command({"--version"}, folder.path());
   EXPECT_EQ(version.exit_code, 0);
@@ -222,9 +224,9 @@ TEST(Command, ManualPageHasEveryVerbWithItsOptions) {
   const Outcome page = run_command({"--man"}, folder.path());
   ASSERT_EQ(page.exit_code, 0) << page.err;
   EXPECT_EQ(page.out.rfind(".TH SHEAF 1 ", 0), 0u);
-  for (const std::string verb :
-       {"solve", "info", "check", "convert", "perturb", "evaluate", "align", "covariance",
-        "calibrate", "compare", "photometric", "report", "view", "generate", "demo"}) {
+  for (const std::string verb : {"solve", "info", "check", "convert", "perturb", "evaluate",
+                                 "align", "covariance", "calibrate", "compare", "photometric",
+                                 "report", "view", "generate", "demo", "split", "join"}) {
     const std::size_t begin = page.out.find("\n.SS " + verb + "\n");
     ASSERT_NE(begin, std::string::npos) << verb;
     const std::string section = page.out.substr(begin, page.out.find("\n.S", begin + 1) - begin);
