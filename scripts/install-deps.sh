@@ -9,6 +9,7 @@
 #   scripts/install-deps.sh --arm64     also what scripts/check-arm64.sh builds and runs with
 #   scripts/install-deps.sh --deb       also what scripts/build-deb.sh packages with
 #   scripts/install-deps.sh --docs      also Doxygen, for scripts/build-docs.sh
+#   scripts/install-deps.sh --mpi       also MPI and PETSc, for sheaf-mpi (docs/machines.md)
 # Several at once will do.
 set -euo pipefail
 
@@ -110,7 +111,8 @@ for flag in "$@"; do
     --arm64) wanted+=("${arm64_packages[@]}") ;;
     --deb) wanted+=("${deb_packages[@]}") ;;
     --docs) wanted+=(doxygen) ;;
-    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb, --docs" >&2
+    --mpi) wanted+=(libpetsc-real-dev libopenmpi-dev openmpi-bin) ;;
+    *) echo "install-deps: $flag is none of --ci, --libcxx, --arm64, --deb, --docs, --mpi" >&2
        exit 2 ;;
   esac
 done
