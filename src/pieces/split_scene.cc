@@ -38,7 +38,8 @@ struct Owners {
   std::vector<std::vector<std::uint32_t>> users;  ///< two images of each lens at most
 };
 
-/// A point belongs where most of the images that see it do, the first of these.
+/// A point belongs where most of the images that see it do; of several such pieces, to the one that
+/// has the fewest observations so far.
 void deal_points(const Problem& problem, std::uint32_t pieces, Owners& to) {
   std::vector<std::uint64_t> first(problem.num_points() + 1, 0);
   for (const std::uint32_t p : problem.observation_point) ++first[p + 1];
@@ -48,14 +49,17 @@ void deal_points(const Problem& problem, std::uint32_t pieces, Owners& to) {
   for (std::size_t i = 0; i < seen.size(); ++i)
     seen[next[problem.observation_point[i]]++] = to.of_image[problem.observation_image[i]];
   std::vector<std::uint32_t> count(pieces, 0);
+  std::vector<std::uint64_t> load(pieces, 0);
   to.of_point.assign(problem.num_points(), 0);
   for (std::uint32_t p = 0; p < problem.num_points(); ++p) {
     std::uint32_t best = p % pieces, most = 0;  // one that nobody sees goes anywhere
-    for (std::uint64_t k = first[p]; k < first[p + 1]; ++k) {
-      const std::uint32_t n = ++count[seen[k]];
-      if (n > most || (n == most && seen[k] < best)) most = n, best = seen[k];
+    for (std::uint64_t k = first[p]; k < first[p + 1]; ++k) most = std::max(most, ++count[seen[k]]);
+    for (std::uint64_t k = first[p], found = 0; k < first[p + 1]; ++k) {
+      const std::uint32_t piece = seen[k];
+      if (std::exchange(count[piece], 0) != most) continue;
+      if (found++ == 0 || load[piece] < load[best]) best = piece;
     }
-    for (std::uint64_t k = first[p]; k < first[p + 1]; ++k) count[seen[k]] = 0;
+    load[best] += first[p + 1] - first[p];
     to.of_point[p] = best;
     to.points[best].push_back(p);
   }
