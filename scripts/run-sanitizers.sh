@@ -17,9 +17,10 @@ case $kind in
     compiler=$(scripts/find-fuzz-compiler.sh)
     scripts/build.sh asan ${compiler:+-DCMAKE_CXX_COMPILER="$compiler" -DSHEAF_BUILD_FUZZ=ON}
     # Left out, besides tests/solve and tests/reduced (studies of how solves converge, through code
-    # that the command's tests run too): what measures memory or errors on many large problems.
+    # that the command's tests run too): what measures memory or errors on many large problems or
+    # computes dense inverses beside them, and what reads sources alone.
     ASAN_OPTIONS=detect_stack_use_after_return=1 UBSAN_OPTIONS=print_stacktrace=1 run_ctest \
-      -E 'PhotometricProof|FamilySizes|Family\.|MemoryForecast|RealOutliers|CheckBits|MonteCarlo|Study'
+      -E 'PhotometricProof|FamilySizes|Family\.|MemoryForecast|RealOutliers|CheckBits|MonteCarlo|Study|IsTheDenseInverseForEveryModel|Floors'
     ;;
   tsan)
     # The distribution's TBB is not instrumented: src/platform/parallel.h runs its tasks on plain
