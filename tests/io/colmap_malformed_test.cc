@@ -20,7 +20,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Offsets in the files of tiny_binary.
 constexpr std::size_t kModel = 12, kWidth = 16, kFocal = 32;
-constexpr std::size_t kImageId = 8, kQuaternion = 12, kCameraId = 68, kName = 72;
+constexpr std::size_t kQuaternion = 12, kCameraId = 68, kName = 72;
 constexpr std::size_t kFeatures = 72 + 15, kFeature0 = kFeatures + 8;
 constexpr std::size_t kImage1 = kFeature0 + 3 * 24;
 constexpr std::size_t kPointId = 8, kXyz = 16, kError = 43, kTrack = 51;
