@@ -16,11 +16,7 @@ if [ -z "$compiler" ]; then
   echo "fuzz: no clang with libFuzzer here: NOT RUN"
   exit 0
 fi
-# What is not optimised compiles sooner and tries a tenth of the inputs: longer searches are worth it.
-optimised=()
-if [ "$seconds" -gt 60 ]; then optimised=(-DSHEAF_UNOPTIMISED_IN=); fi
-scripts/build.sh asan --target fuzz/all -DCMAKE_CXX_COMPILER="$compiler" -DSHEAF_BUILD_FUZZ=ON \
-  "${optimised[@]}"
+scripts/build.sh asan --target fuzz/all -DCMAKE_CXX_COMPILER="$compiler" -DSHEAF_BUILD_FUZZ=ON
 mkdir -p build/fuzz
 mapfile -t targets < <(find build/asan/fuzz -maxdepth 1 -type f -executable -name '*fuzz*' | sort)
 if [ ${#targets[@]} = 0 ]; then
