@@ -62,20 +62,36 @@ DistributedOptions options_for(const Arguments& a) {
   return out;
 }
 
-std::uint32_t agreed_pieces(const std::string& folder) {
-  int rank = 0, ranks = 1;
+/// What concerns files that are not a piece's own is the first rank's to do: ranks that look at one
+/// folder at once get into each other's way. What it finds wrong all throw, so that nobody waits for
+/// a rank that has left.
+template <class Task>
+void on_first_rank(const Task& task) {
+  int rank = 0, code = -1;
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  MPI_Comm_size(PETSC_COMM_WORLD, &ranks);
   std::string failed;
-  unsigned pieces = 0;
   if (rank == 0) {
-    if (const Result<std::uint32_t> count = count_pieces(folder); count.ok())
-      pieces = count.value();
-    else
-      failed = count.error().what();
+    try {
+      task();
+    } catch (const Error& error) {
+      failed = error.what();
+      code = static_cast<int>(error.code());
+    }
   }
-  failed = Ranks(PETSC_COMM_WORLD, static_cast<std::uint32_t>(ranks)).first_text(failed);
-  if (!failed.empty()) throw Error(ErrorCode::unreadable_input, failed);
+  MPI_Bcast(&code, 1, MPI_INT, 0, PETSC_COMM_WORLD);
+  if (code < 0) return;
+  int size = static_cast<int>(failed.size());
+  MPI_Bcast(&size, 1, MPI_INT, 0, PETSC_COMM_WORLD);
+  failed.resize(static_cast<std::size_t>(size));
+  MPI_Bcast(failed.data(), size, MPI_CHAR, 0, PETSC_COMM_WORLD);
+  throw Error(static_cast<ErrorCode>(code), failed);
+}
+
+std::uint32_t agreed_pieces(const std::string& folder) {
+  int ranks = 1;
+  MPI_Comm_size(PETSC_COMM_WORLD, &ranks);
+  unsigned pieces = 0;
+  on_first_rank([&] { pieces = count_pieces(folder).value(); });
   MPI_Bcast(&pieces, 1, MPI_UNSIGNED, 0, PETSC_COMM_WORLD);
   if (static_cast<unsigned>(ranks) > pieces)
     throw Error(ErrorCode::usage, fmt::format("found {} ranks for {} pieces, expected no more "
@@ -165,7 +181,8 @@ Json record_of(const Arguments& a, const DistributedSystem& system, const Ranks&
 int run(const Arguments& a) {
   const Timer total;
   Interrupt interrupt(a.common.quiet);
-  check_outputs({{"-o", a.out, false, true}, {"--json", a.common.json}}, {});
+  on_first_rank(
+      [&] { check_outputs({{"-o", a.out, false, true}, {"--json", a.common.json}}, {}); });
   interrupt.limit(a.solve.options.time_limit_s);
   const DistributedOptions options = options_for(a);
   if (!a.petsc.empty()) petsc_check(PetscOptionsInsertString(nullptr, a.petsc.c_str()));
@@ -187,16 +204,7 @@ int run(const Arguments& a) {
   progress.end();
   interrupt.begin_write();
   if (!a.out.empty() && summary.usable()) {
-    std::string failed;
-    if (speaks) {
-      try {
-        make_piece_folder(a.out);
-      } catch (const Error& error) {
-        failed = error.what();
-      }
-    }
-    failed = ranks.first_text(failed);
-    if (!failed.empty()) throw Error(ErrorCode::unwritable_output, failed);
+    on_first_rank([&] { make_piece_folder(a.out); });
     system->store(a.out).value();
     if (speaks) remove_other_pieces(a.out, ranks.pieces());
   }
