@@ -40,10 +40,11 @@ void remove_other_pieces(const std::string& folder, std::uint32_t pieces) {
 }
 
 std::uint32_t join_pieces(const std::string& folder, Problem& scene) {
-  const std::uint32_t count = count_pieces(folder).value();
   const std::string digest = digest_of_scene(scene);
+  std::uint32_t count = 1;
   for (std::uint32_t k = 0; k < count; ++k) {
     const ScenePiece piece = read_piece(folder, k).value();
+    if (k == 0) count = piece.pieces;
     join_piece(piece, scene).value();
     if (piece.scene != digest || piece.pieces != count)
       throw Error(ErrorCode::usage,

@@ -61,15 +61,11 @@ Json pieces_json(const SplitSummary& split) {
 void say(const SplitArguments& a, const Problem& problem, const SplitSummary& split) {
   const Ghosts ghosts = ghosts_of(split);
   print_out("{}: {}\n", a.in, counts_text(problem));
+  const auto [least, most] =
+      std::minmax_element(split.pieces.begin(), split.pieces.end(),
+                          [](const auto& x, const auto& y) { return x.images < y.images; });
   print_out("pieces      {}, {} to {} images, the largest has {:.3g} times the mean observations\n",
-            split.pieces.size(),
-            std::min_element(split.pieces.begin(), split.pieces.end(),
-                             [](const auto& x, const auto& y) { return x.images < y.images; })
-                ->images,
-            std::max_element(split.pieces.begin(), split.pieces.end(),
-                             [](const auto& x, const auto& y) { return x.images < y.images; })
-                ->images,
-            split.imbalance);
+            split.pieces.size(), least->images, most->images, split.imbalance);
   print_out(
       "ghosts      {}, {} in the piece with most, {:.3g} for each of a piece's own images at "
       "most\n",

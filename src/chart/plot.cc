@@ -55,6 +55,14 @@ void Drawing::text_upwards(double x, double y, const std::string& text, const st
           "</text>";
 }
 
+void Drawing::shade_bar(double x, double y, const std::string& png, const std::string& low,
+                        const std::string& high, const std::string& what) {
+  text(x, y + 14, what, "");
+  picture(x, y + 24, kBarShades, 16, png);
+  text(x, y + 58, low, "m");
+  text(x + kBarShades, y + 58, high, "m", Anchor::end);
+}
+
 void Drawing::picture(double x, double y, double width, double height, const std::string& png) {
   out_ += "<image x=\"" + coordinate(x) + "\" y=\"" + coordinate(y) + "\" width=\"" +
           coordinate(width) + "\" height=\"" + coordinate(height) +

@@ -30,6 +30,11 @@ class Drawing {
                     Anchor anchor = Anchor::start);
   /// The pixels of a PNG file, stretched to this place.
   void picture(double x, double y, double width, double height, const std::string& png);
+  /// A bar of shades, a PNG of one row of kBarShades pixels, between the labels of its two ends
+  /// with what it shows above; (x, y) is its top left corner, text included.
+  static constexpr int kBarShades = 320;
+  void shade_bar(double x, double y, const std::string& png, const std::string& low,
+                 const std::string& high, const std::string& what);
   const std::string& content() const { return out_; }
   /// As an image of this size, whose label is read where it cannot be seen; scales to its place.
   std::string svg(double width, double height, const std::string& label) const;

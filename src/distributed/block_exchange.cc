@@ -10,7 +10,7 @@
 namespace sheaf {
 
 BlockExchange::BlockExchange(const Ranks& ranks, const std::vector<std::uint32_t>& owned,
-                             const std::vector<std::vector<GhostBlock>>& ghosts)
+                             const std::vector<std::vector<Ghost>>& ghosts)
     : rank_(ranks.rank()) {
   // Everybody knows where the owned blocks of every piece stand at its rank.
   const std::vector<double> counts = ranks.gather(1, {owned.begin(), owned.end()});
@@ -26,9 +26,9 @@ BlockExchange::BlockExchange(const Ranks& ranks, const std::vector<std::uint32_t
   for (std::size_t k = 0; k < owned.size(); ++k) {
     first_owned_.push_back(first_owned_.back() + owned[k]);
     first_ghost_.push_back(first_ghost_.back() + ghosts[k].size());
-    for (const GhostBlock& ghost : ghosts[k]) {
+    for (const Ghost& ghost : ghosts[k]) {
       const int rank = ranks.rank_of(ghost.piece);
-      from.push_back({rank, static_cast<PetscInt>(first[ghost.piece] + ghost.block)});
+      from.push_back({rank, static_cast<PetscInt>(first[ghost.piece] + ghost.index)});
       remote_ += rank != rank_;
     }
   }

@@ -10,23 +10,19 @@
 #include <vector>
 
 #include "distributed/ranks.h"
+#include "pieces/scene_piece.h"
 
 namespace sheaf {
-
-/// Where a ghost's block stands at its owner's.
-struct GhostBlock {
-  std::uint32_t piece = 0;
-  std::uint32_t block = 0;  ///< among those that this piece owns
-};
 
 /// Camera blocks of this rank: those that its pieces own stand one piece behind the other, and so
 /// do its ghosts. State and steps go from owners to ghosts; shares of sums go back and are added in
 /// the order of the pieces. Nothing else of the vectors ever moves.
 class BlockExchange {
  public:
-  /// Of each of this rank's pieces, how many blocks it owns and where its ghosts are.
+  /// Of each of this rank's pieces, how many blocks it owns and where its ghosts are among those of
+  /// their owners.
   BlockExchange(const Ranks& ranks, const std::vector<std::uint32_t>& owned,
-                const std::vector<std::vector<GhostBlock>>& ghosts);
+                const std::vector<std::vector<Ghost>>& ghosts);
   ~BlockExchange();
   BlockExchange(const BlockExchange&) = delete;
   BlockExchange& operator=(const BlockExchange&) = delete;

@@ -64,11 +64,9 @@ void DistributedSystem::add_shares_of_sums() {
     const double* from = pieces_[p]->points().sums().diagonal;
     sums_[p].assign(from, from + kSums * pieces_[p]->num_blocks());
     const double* full = owned.data() + kSums * exchange_->first_owned(p);
-    pieces_[p]->for_each(
-        [&](std::size_t k, std::uint32_t b) {
-          std::copy_n(full + kSums * k, kSums, &sums_[p][kSums * b]);
-        },
-        [](std::size_t, std::uint32_t) {});
+    pieces_[p]->for_each_owned([&](std::size_t k, std::uint32_t b) {
+      std::copy_n(full + kSums * k, kSums, &sums_[p][kSums * b]);
+    });
   }
 }
 
@@ -83,19 +81,17 @@ double DistributedSystem::gather() {
       damping_[p][c] =
           request_.damping * std::clamp(vectors_[p].squares[c], kDiagonalFloor, kDiagonalCeiling);
     const std::size_t first = kWidth * exchange_->first_owned(p);
-    piece.for_each(
-        [&](std::size_t k, std::uint32_t b) {
-          for (std::size_t j = 0; j < kWidth; ++j) {
-            const std::int32_t c = columns.image(b)[j];
-            const std::size_t at = first + kWidth * k + j;
-            rhs_[at] = c >= 0 ? vectors_[p].rhs[static_cast<std::size_t>(c)] : 0;
-            owned_damping_[at] = c >= 0 ? damping_[p][static_cast<std::size_t>(c)] : 0;
-            if (c < 0) continue;
-            const double square = owned_damping_[at] / request_.damping;
-            gradient = std::max(gradient, std::abs(rhs_[at]) / std::sqrt(square));
-          }
-        },
-        [](std::size_t, std::uint32_t) {});
+    piece.for_each_owned([&](std::size_t k, std::uint32_t b) {
+      for (std::size_t j = 0; j < kWidth; ++j) {
+        const std::int32_t c = columns.image(b)[j];
+        const std::size_t at = first + kWidth * k + j;
+        rhs_[at] = c >= 0 ? vectors_[p].rhs[static_cast<std::size_t>(c)] : 0;
+        owned_damping_[at] = c >= 0 ? damping_[p][static_cast<std::size_t>(c)] : 0;
+        if (c < 0) continue;
+        const double square = owned_damping_[at] / request_.damping;
+        gradient = std::max(gradient, std::abs(rhs_[at]) / std::sqrt(square));
+      }
+    });
   }
   return ranks_.max(gradient);
 }
@@ -129,27 +125,8 @@ void DistributedSystem::multiply(const double* x, double* y) {
 
 void DistributedSystem::precondition(const double* r, double* z) {
   for (std::size_t p = 0; p < pieces_.size(); ++p) {
-    RankPiece& piece = *pieces_[p];
     const std::size_t first = kWidth * exchange_->first_owned(p);
-    const Columns& columns = piece.columns();
-    Buffer<double>&from = columns_[p], &to = out_[p];
-    from.fill(0);
-    piece.for_each(
-        [&](std::size_t k, std::uint32_t b) {
-          for (std::size_t j = 0; j < kWidth; ++j)
-            if (const std::int32_t c = columns.image(b)[j]; c >= 0)
-              from[static_cast<std::size_t>(c)] = r[first + kWidth * k + j];
-        },
-        [](std::size_t, std::uint32_t) {});
-    piece.diagonal().solve(from.data(), to.data());
-    piece.for_each(
-        [&](std::size_t k, std::uint32_t b) {
-          for (std::size_t j = 0; j < kWidth; ++j) {
-            const std::int32_t c = columns.image(b)[j];
-            z[first + kWidth * k + j] = c >= 0 ? to[static_cast<std::size_t>(c)] : 0;
-          }
-        },
-        [](std::size_t, std::uint32_t) {});
+    pieces_[p]->precondition(r + first, z + first);
   }
 }
 

@@ -26,40 +26,28 @@ double dot_of(const double* a, const double* b, std::size_t n) {
          ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
 }
 
-/// What vectors know of their pieces: PETSc's own sums follow the number of ranks.
-struct Pieces {
-  const Ranks* ranks;
-  std::vector<std::size_t> begins;
-
-  std::vector<double> dots(const double* a, const std::vector<const double*>& b) const {
-    std::vector<double> mine;
-    for (std::size_t p = 0; p + 1 < begins.size(); ++p)
-      for (const double* v : b)
-        mine.push_back(dot_of(a + begins[p], v + begins[p], begins[p + 1] - begins[p]));
-    return ranks->sum(b.size(), mine);
-  }
-};
-
-PetscErrorCode pieces_of(Vec x, const Pieces** out) {
+// PETSc's own sums follow the number of ranks: vectors know the Krylov that they are of, which sums
+// by piece.
+PetscErrorCode owner_of(Vec x, const Krylov** out) {
   PetscContainer container = nullptr;
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectQuery(reinterpret_cast<PetscObject>(x), "pieces",
+  PetscCall(PetscObjectQuery(reinterpret_cast<PetscObject>(x), "krylov",
                              reinterpret_cast<PetscObject*>(&container)));
   PetscCall(
-      PetscContainerGetPointer(container, reinterpret_cast<void**>(const_cast<Pieces**>(out))));
+      PetscContainerGetPointer(container, reinterpret_cast<void**>(const_cast<Krylov**>(out))));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode dots_by_piece(Vec x, PetscInt n, const Vec y[], PetscScalar* out) {
-  const Pieces* pieces = nullptr;
+  const Krylov* owner = nullptr;
   const double* a = nullptr;
   PetscFunctionBeginUser;
-  PetscCall(pieces_of(x, &pieces));
+  PetscCall(owner_of(x, &owner));
   PetscCall(VecGetArrayRead(x, &a));
   std::vector<const double*> b(static_cast<std::size_t>(n));
   for (PetscInt k = 0; k < n; ++k)
     PetscCall(VecGetArrayRead(y[k], &b[static_cast<std::size_t>(k)]));
-  const std::vector<double> sums = pieces->dots(a, b);
+  const std::vector<double> sums = owner->dots(a, b);
   std::copy(sums.begin(), sums.end(), out);
   for (PetscInt k = 0; k < n; ++k)
     PetscCall(VecRestoreArrayRead(y[k], &b[static_cast<std::size_t>(k)]));
@@ -76,7 +64,7 @@ PetscErrorCode norm_by_piece(Vec x, NormType type, PetscReal* out) {
   PetscFunctionReturn(0);
 }
 
-/// Duplicates keep the pieces and the sums.
+/// Duplicates keep the sums.
 PetscErrorCode duplicate_by_piece(Vec x, Vec* out);
 void sum_by_piece(Vec x) {
   x->ops->dot = x->ops->tdot = dot_by_piece;
@@ -85,14 +73,14 @@ void sum_by_piece(Vec x) {
   x->ops->duplicate = duplicate_by_piece;
 }
 PetscErrorCode duplicate_by_piece(Vec x, Vec* out) {
-  PetscObject pieces = nullptr;
+  PetscObject owner = nullptr;
   PetscInt local = 0;
   PetscFunctionBeginUser;
   PetscCall(VecGetLocalSize(x, &local));
   PetscCall(
       VecCreateMPI(PetscObjectComm(reinterpret_cast<PetscObject>(x)), local, PETSC_DETERMINE, out));
-  PetscCall(PetscObjectQuery(reinterpret_cast<PetscObject>(x), "pieces", &pieces));
-  PetscCall(PetscObjectCompose(reinterpret_cast<PetscObject>(*out), "pieces", pieces));
+  PetscCall(PetscObjectQuery(reinterpret_cast<PetscObject>(x), "krylov", &owner));
+  PetscCall(PetscObjectCompose(reinterpret_cast<PetscObject>(*out), "krylov", owner));
   sum_by_piece(*out);
   PetscFunctionReturn(0);
 }
@@ -133,12 +121,8 @@ void Krylov::make_vectors() {
   petsc_check(VecCreateMPI(ranks_.comm(), static_cast<PetscInt>(size()), PETSC_DETERMINE, &x_));
   PetscContainer container = nullptr;
   petsc_check(PetscContainerCreate(ranks_.comm(), &container));
-  petsc_check(PetscContainerSetPointer(container, new Pieces{&ranks_, begins_}));
-  petsc_check(PetscContainerSetUserDestroy(container, [](void* p) -> PetscErrorCode {
-    delete static_cast<Pieces*>(p);
-    return 0;
-  }));
-  petsc_check(PetscObjectCompose(reinterpret_cast<PetscObject>(x_), "pieces",
+  petsc_check(PetscContainerSetPointer(container, this));
+  petsc_check(PetscObjectCompose(reinterpret_cast<PetscObject>(x_), "krylov",
                                  reinterpret_cast<PetscObject>(container)));
   petsc_check(PetscContainerDestroy(&container));
   sum_by_piece(x_);
@@ -235,13 +219,17 @@ Krylov::Solution Krylov::solve(const double* b, double forcing,
   petsc_check(VecGetArrayRead(x_, &from));
   std::copy_n(from, size(), x);
   petsc_check(VecRestoreArrayRead(x_, &from));
-  const double length2 = dot(x, x);
+  const double length2 = dots(x, {x})[0];
   return {!stopped_ && std::isfinite(length2) && (reason > 0 || reason == KSP_DIVERGED_ITS),
           static_cast<int>(iterations)};
 }
 
-double Krylov::dot(const double* a, const double* b) const {
-  return Pieces{&ranks_, begins_}.dots(a, {b})[0];
+std::vector<double> Krylov::dots(const double* a, const std::vector<const double*>& b) const {
+  std::vector<double> mine;
+  for (std::size_t p = 0; p + 1 < begins_.size(); ++p)
+    for (const double* v : b)
+      mine.push_back(dot_of(a + begins_[p], v + begins_[p], begins_[p + 1] - begins_[p]));
+  return ranks_.sum(b.size(), mine);
 }
 
 }  // namespace sheaf

@@ -34,8 +34,8 @@ class Krylov {
   /// cancelled: asked by every rank alike at each iteration; or null.
   Solution solve(const double* b, double forcing, const std::function<bool()>& cancelled,
                  double* x);
-  /// a . b, piece by piece in their order, as the vectors' own dot products are.
-  double dot(const double* a, const double* b) const;
+  /// a . b for each b, summed piece by piece in their order: the vectors' own dot products.
+  std::vector<double> dots(const double* a, const std::vector<const double*>& b) const;
 
  private:
   void make_vectors();

@@ -129,14 +129,13 @@ PieceRules DistributedSystem::rules_for(const std::vector<ScenePiece>& files,
 void DistributedSystem::number_blocks() {
   // Where lenses' own blocks stand is their owners' to say.
   std::vector<std::uint32_t> lenses, owned;
-  std::vector<std::vector<GhostBlock>> ghost_lenses, ghosts;
+  std::vector<std::vector<Ghost>> ghost_lenses, ghosts;
   std::vector<double> places;
   for (auto& piece : pieces_) {
     const ScenePiece& file = piece->scene_piece();
     lenses.push_back(file.owned_cameras);
     owned.push_back(piece->num_owned());
-    auto& to = ghost_lenses.emplace_back();
-    for (const Ghost& ghost : file.ghost_cameras) to.push_back({ghost.piece, ghost.index});
+    ghost_lenses.push_back(file.ghost_cameras);
     const std::vector<double> mine = piece->lens_places();
     places.insert(places.end(), mine.begin(), mine.end());
   }
@@ -165,18 +164,11 @@ void DistributedSystem::number_blocks() {
 
 /// The frame of all images, piece by piece: scene_frame() of the scene but for the order of sums.
 void DistributedSystem::place_charts() {
-  const auto centre = [](const RigidMotion<double>& pose) {
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    const auto& t = pose.translation;
-    std::array<double, 3> out{};
-    for (std::size_t k = 0; k < 3; ++k) out[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-    return out;
-  };
   const auto sum = [&](std::size_t width, const auto& add) {
     std::vector<double> mine(width * pieces_.size(), 0);
     for (std::size_t p = 0; p < pieces_.size(); ++p)
       for (std::size_t i = 0; i < pieces_[p]->scene_piece().owned_images; ++i)
-        add(centre(pieces_[p]->points().state().held.cameras.poses[i]), &mine[width * p]);
+        add(centre_of(pieces_[p]->points().state().held.cameras.poses[i]), &mine[width * p]);
     return ranks_.sum(width, mine);
   };
   SceneFrame frame;

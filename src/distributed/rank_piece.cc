@@ -42,6 +42,8 @@ void RankPiece::take(Build::Parts parts, Threads& threads, bool mixed) {
   x_.allocate(kBlockVector * num_blocks());
   y_.allocate(kBlockVector * num_blocks());
   x_.fill(0);
+  from_ = column_vector();
+  to_ = column_vector();
   own_blocks();
 }
 
@@ -69,7 +71,7 @@ std::vector<double> RankPiece::lens_places() const {
 void RankPiece::place_ghosts(const std::vector<double>& places) {
   for (std::size_t k = 0; k < piece_.ghost_images.size(); ++k) {
     ghost_.push_back(piece_.owned_images + static_cast<std::uint32_t>(k));
-    ghosts_.push_back({piece_.ghost_images[k].piece, piece_.ghost_images[k].index});
+    ghosts_.push_back(piece_.ghost_images[k]);
   }
   const LensTracks* tracks = build_->tracks();
   for (std::size_t k = 0; tracks != nullptr && k < piece_.ghost_cameras.size(); ++k) {
@@ -108,21 +110,34 @@ void RankPiece::multiply(const double* owned, const double* ghosts, double* to_o
            [&](std::size_t k, std::uint32_t b) { take(b, to_ghosts + kWidth * k); });
 }
 
+void RankPiece::precondition(const double* r, double* z) {
+  from_.fill(0);
+  for_each_owned([&](std::size_t k, std::uint32_t b) { to_columns(b, r + kWidth * k, from_); });
+  diagonal_->solve(from_.data(), to_.data());
+  for_each_owned([&](std::size_t k, std::uint32_t b) {
+    for (int j = 0; j < kWidth; ++j) {
+      const std::int32_t c = columns_->image(b)[j];
+      z[kWidth * k + static_cast<std::size_t>(j)] = c >= 0 ? to_[static_cast<std::size_t>(c)] : 0;
+    }
+  });
+}
+
 Buffer<double> RankPiece::column_vector() const {
   Buffer<double> out((static_cast<std::size_t>(columns_->count) + 7) / 8 * 8);
   out.fill(0);
   return out;
 }
 
+void RankPiece::to_columns(std::uint32_t block, const double* from, Buffer<double>& columns) const {
+  for (int k = 0; k < kWidth; ++k)
+    if (const std::int32_t c = columns_->image(block)[k]; c >= 0)
+      columns[static_cast<std::size_t>(c)] = from[k];
+}
+
 void RankPiece::to_columns(const double* owned, const double* ghosts,
                            Buffer<double>& columns) const {
-  const auto put = [&](std::uint32_t b, const double* from) {
-    for (int k = 0; k < kWidth; ++k)
-      if (const std::int32_t c = columns_->image(b)[k]; c >= 0)
-        columns[static_cast<std::size_t>(c)] = from[k];
-  };
-  for_each([&](std::size_t k, std::uint32_t b) { put(b, owned + kWidth * k); },
-           [&](std::size_t k, std::uint32_t b) { put(b, ghosts + kWidth * k); });
+  for_each([&](std::size_t k, std::uint32_t b) { to_columns(b, owned + kWidth * k, columns); },
+           [&](std::size_t k, std::uint32_t b) { to_columns(b, ghosts + kWidth * k, columns); });
 }
 
 double RankPiece::step_cameras(const Buffer<double>& columns) {
@@ -139,7 +154,7 @@ const ScenePiece& RankPiece::store() {
 std::uint64_t RankPiece::bytes() const {
   return points_->bytes() + products_.exact->bytes() +
          (products_.rounded ? products_.rounded->bytes() : 0) + diagonal_->bytes() + x_.bytes() +
-         y_.bytes();
+         y_.bytes() + from_.bytes() + to_.bytes();
 }
 
 }  // namespace sheaf

@@ -52,12 +52,17 @@ class RankPiece {
   /// places: those two numbers of each ghost lens at its owner's. Throws std::runtime_error where
   /// an owner sees a lens in another way.
   void place_ghosts(const std::vector<double>& places);
-  const std::vector<GhostBlock>& ghosts() const { return ghosts_; }
+  const std::vector<Ghost>& ghosts() const { return ghosts_; }
 
-  /// Calls to_owned(k, block) and to_ghost(k, block) for all of either kind.
+  /// Calls task(k, block) for the k-th block that it owns.
+  template <class Task>
+  void for_each_owned(const Task& task) const {
+    for (std::size_t k = 0; k < owned_.size(); ++k) task(k, owned_[k]);
+  }
+  /// And to_ghost(k, block) for the k-th ghost.
   template <class ToOwned, class ToGhost>
   void for_each(const ToOwned& to_owned, const ToGhost& to_ghost) const {
-    for (std::size_t k = 0; k < owned_.size(); ++k) to_owned(k, owned_[k]);
+    for_each_owned(to_owned);
     for (std::size_t k = 0; k < ghost_.size(); ++k) to_ghost(k, ghost_[k]);
   }
 
@@ -67,6 +72,8 @@ class RankPiece {
   void multiply(const double* owned, const double* ghosts, double* to_owned, double* to_ghosts);
 
   BlockDiagonal& diagonal() { return *diagonal_; }
+  /// z = M^-1 r of what it owns, by the diagonal blocks.
+  void precondition(const double* r, double* z);
   /// By column, padded to a multiple of eight.
   Buffer<double> column_vector() const;
   void to_columns(const double* owned, const double* ghosts, Buffer<double>& columns) const;
@@ -81,6 +88,7 @@ class RankPiece {
   explicit RankPiece(ScenePiece piece) : piece_(std::move(piece)) {}
   void take(Build::Parts parts, Threads& threads, bool mixed);
   void own_blocks();
+  void to_columns(std::uint32_t block, const double* from, Buffer<double>& columns) const;
 
   ScenePiece piece_;
   std::optional<Build> build_;
@@ -91,8 +99,9 @@ class RankPiece {
   StateOperator* product_ = nullptr;
   std::optional<BlockDiagonal> diagonal_;
   std::vector<std::uint32_t> owned_, ghost_;  ///< local blocks
-  std::vector<GhostBlock> ghosts_;
-  Buffer<double> x_, y_;  ///< kBlockVector per block
+  std::vector<Ghost> ghosts_;
+  Buffer<double> x_, y_;      ///< kBlockVector per block
+  Buffer<double> from_, to_;  ///< by column
 };
 
 }  // namespace sheaf

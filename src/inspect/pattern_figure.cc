@@ -191,15 +191,12 @@ void draw_network(const Panel& panel, const NetworkView& view, const std::vector
 
 Result<void> draw_bar(Drawing& out, double x, double y, const std::string& low,
                       const std::string& high, const std::string& what) {
-  constexpr int kWidth = 320;
+  constexpr int kWidth = Drawing::kBarShades;
   std::vector<std::uint16_t> greys;
   for (int k = 0; k < kWidth; ++k) greys.push_back(shade(k / (kWidth - 1.0)));
   const Result<std::string> png = encode_png(Raster{kWidth, 1, 1, 8, std::move(greys)});
   if (!png.ok()) return png.error();
-  out.text(x, y + 14, what, "");
-  out.picture(x, y + 24, kWidth, 16, png.value());
-  out.text(x, y + 58, low, "m");
-  out.text(x + kWidth, y + 58, high, "m", Anchor::end);
+  out.shade_bar(x, y, png.value(), low, high, what);
   return {};
 }
 

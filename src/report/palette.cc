@@ -47,15 +47,12 @@ Color size_shade(double t) {
 Result<void> draw_colour_bar(Drawing& out, double x, double y, Color (*shade)(double), double from,
                              double to, const std::string& low, const std::string& high,
                              const std::string& what) {
-  constexpr int kWidth = 320;
+  constexpr int kWidth = Drawing::kBarShades;
   Image bar(kWidth, 1, kPaper);
   for (int k = 0; k < kWidth; ++k) bar.set(k, 0, shade(from + (to - from) * k / (kWidth - 1)));
   const Result<std::string> png = encode_png(bar);
   if (!png.ok()) return png.error();
-  out.text(x, y + 14, what, "");
-  out.picture(x, y + 24, kWidth, 16, png.value());
-  out.text(x, y + 58, low, "m");
-  out.text(x + kWidth, y + 58, high, "m", Anchor::end);
+  out.shade_bar(x, y, png.value(), low, high, what);
   return {};
 }
 

@@ -45,22 +45,28 @@ CameraState camera_state(const Problem& problem) {
   return out;
 }
 
+std::array<double, 3> centre_of(const RigidMotion<double>& pose) {
+  const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
+  const auto& t = pose.translation;
+  std::array<double, 3> out{};
+  for (std::size_t k = 0; k < 3; ++k) out[k] = -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
+  return out;
+}
+
 SceneFrame scene_frame(const CameraState& state) {
-  const auto centre = [](const RigidMotion<double>& pose, std::size_t k) {
-    const Matrix3<double> R = matrix_from_quaternion(pose.rotation);
-    const auto& t = pose.translation;
-    return -(R[k] * t[0] + R[3 + k] * t[1] + R[6 + k] * t[2]);
-  };
   SceneFrame out;
   const auto images = static_cast<double>(state.poses.size());
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (const auto& pose : state.poses) out.origin[k] += centre(pose, k);
-    out.origin[k] /= images;
+  for (const auto& pose : state.poses) {
+    const std::array<double, 3> centre = centre_of(pose);
+    for (std::size_t k = 0; k < 3; ++k) out.origin[k] += centre[k];
   }
+  for (double& x : out.origin) x /= images;
   double length = 0;
-  for (const auto& pose : state.poses)
-    length += std::hypot(centre(pose, 0) - out.origin[0], centre(pose, 1) - out.origin[1],
-                         centre(pose, 2) - out.origin[2]);
+  for (const auto& pose : state.poses) {
+    const std::array<double, 3> centre = centre_of(pose);
+    length +=
+        std::hypot(centre[0] - out.origin[0], centre[1] - out.origin[1], centre[2] - out.origin[2]);
+  }
   out.unit = towards_one(length / images);
   return out;
 }

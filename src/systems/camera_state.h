@@ -40,6 +40,8 @@ struct SceneFrame {
   double unit = 1;
 };
 SceneFrame scene_frame(const CameraState& state);
+/// -R^T t.
+std::array<double, 3> centre_of(const RigidMotion<double>& pose);
 
 /// Writes poses and lenses back.
 void store(const CameraState& state, Problem& problem);
